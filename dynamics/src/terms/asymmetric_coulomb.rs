@@ -26,6 +26,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -2.5,
     parameters: &[
         Parameter::at_least("coulomb_positive_nm", 0.0),
         Parameter::at_least("coulomb_negative_nm", 0.0),

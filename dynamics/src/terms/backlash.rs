@@ -37,6 +37,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Transmission,
     place: PlaceKind::Joint,
     layer: Layer::Body,
+    odds_nats: -4.0,
     parameters: &[
         Parameter::at_least("gap_rad", 0.0),
         Parameter::at_least("rotor_inertia_kgm2", 0.0),

@@ -26,6 +26,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Mounting,
     place: PlaceKind::Base,
     layer: Layer::Body,
+    odds_nats: -3.0,
     parameters: &[Parameter::any("roll_rad"), Parameter::any("pitch_rad")],
     coordinates: &[
         Coordinate::bending_factor("roll_rad"),

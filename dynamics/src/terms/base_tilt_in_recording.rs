@@ -22,6 +22,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Mounting,
     place: PlaceKind::Base,
     layer: Layer::Body,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::any("roll_rad"),
         Parameter::any("pitch_rad"),

@@ -21,6 +21,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::any("bias_before_nm"),
         Parameter::any("bias_after_nm"),

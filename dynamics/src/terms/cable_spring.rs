@@ -36,6 +36,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Spring,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -4.0,
     parameters: &[
         Parameter::at_least("stiffness_nm_per_rad", 0.0),
         Parameter::any("rest_angle_rad"),

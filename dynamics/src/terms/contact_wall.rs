@@ -57,6 +57,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Contact,
     place: PlaceKind::Tool,
     layer: Layer::Body,
+    odds_nats: -5.0,
     parameters: &[
         Parameter::at_least("stiffness_n_per_m", 0.0),
         Parameter::ratio("normal_x", f64::NEG_INFINITY),

@@ -22,6 +22,7 @@ pub static EFFECT: Effect = Effect {
     family: Family::PlainFriction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -0.3,
     parameters: &[Parameter::at_least("coulomb_nm", 0.0)],
     coordinates: &[Coordinate::positive_factor("coulomb_nm")],
     to_parameters: <[f64]>::to_vec,

@@ -21,6 +21,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Spring,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -4.0,
     parameters: &[
         Parameter::at_least("amplitude_nm", 0.0),
         Parameter::any("rest_angle_rad"),

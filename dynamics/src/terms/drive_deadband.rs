@@ -29,6 +29,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
+    odds_nats: -7.0,
     parameters: &[Parameter::at_least("deadband_nm", 0.0)],
     coordinates: &[Coordinate::shape(
         "deadband_nm",

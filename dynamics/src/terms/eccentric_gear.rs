@@ -22,6 +22,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Spring,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::at_least("variation_nm", 0.0),
         Parameter::at_least("cycles_per_rev", 0.0),

@@ -25,6 +25,10 @@ pub struct Effect {
     pub place: PlaceKind,
     /// Where in the chain from motion to recorded effort it acts.
     pub layer: Layer,
+    /// Logarithm of the prior odds that it is met at one place of an arm \[nats\]: next to nothing for friction, -3 for what is
+    /// met now and then (a payload, a torque constant), -4 for what is met seldom, -5 for what happens once, and -7 for what
+    /// few have met. Chosen: by order of magnitude, from service manuals.
+    pub odds_nats: f64,
     /// Its parameters as files and reports hold them.
     pub parameters: &'static [Parameter],
     /// What a fit searches in; the order of the values that `build` takes.
@@ -226,6 +230,8 @@ pub struct Traits {
     pub is_fast: bool,
     /// A term of [`Layer::Record`] that only adds.
     pub only_adds: bool,
+    /// It only shifts effort or position in time.
+    pub shifts_time: bool,
     /// It cuts the effort off at a limit, of a sensor or of a drive: a finding says of which.
     pub cuts_off: bool,
     /// It multiplies all effort of a joint: where nobody knows the joint's scale, it says nothing.
@@ -265,6 +271,7 @@ impl Traits {
         needs_load: false,
         is_fast: false,
         only_adds: false,
+        shifts_time: false,
         cuts_off: false,
         is_scale: false,
         describes_only: false,

@@ -34,6 +34,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Body,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::at_least("amplitude_rad", 0.0),
         Parameter::at_least("cycles_per_rev", 0.0),

@@ -32,6 +32,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Contact,
     place: PlaceKind::Link,
     layer: Layer::Body,
+    odds_nats: -5.0,
     parameters: &[
         Parameter::any("force_x_n"),
         Parameter::any("force_y_n"),

@@ -24,6 +24,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::at_least("coulomb_start_nm", 0.0),
         Parameter::any("growth_nm_per_s"),

@@ -26,6 +26,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -4.5,
     parameters: &[
         Parameter::at_least("coulomb_before_nm", 0.0),
         Parameter::at_least("coulomb_after_nm", 0.0),

@@ -27,6 +27,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::ratio("gain_excess_start", f64::NEG_INFINITY),
         Parameter::any("growth_per_s"),

@@ -28,6 +28,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::ratio("share_of_effort", 0.0),
         Parameter::at_least("cycles_per_rev", 0.0),

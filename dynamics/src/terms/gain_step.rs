@@ -27,6 +27,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::ratio("gain_excess_before", f64::NEG_INFINITY),
         Parameter::ratio("gain_excess_after", f64::NEG_INFINITY),

@@ -27,6 +27,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::ratio("driving_coefficient", 0.0),
         Parameter::ratio("backdriving_coefficient", 0.0),

@@ -31,6 +31,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Transmission,
     place: PlaceKind::Joint,
     layer: Layer::Body,
+    odds_nats: -4.0,
     parameters: &[
         Parameter::at_least("stiffness_nm_per_rad", 1.0),
         Parameter::at_least("rotor_inertia_kgm2", 0.0),

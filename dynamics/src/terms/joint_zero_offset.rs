@@ -34,6 +34,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Mounting,
     place: PlaceKind::Joint,
     layer: Layer::Body,
+    odds_nats: -4.0,
     parameters: &[Parameter::any("offset_rad")],
     coordinates: &[Coordinate::bending_factor("offset_rad")],
     to_parameters: <[f64]>::to_vec,

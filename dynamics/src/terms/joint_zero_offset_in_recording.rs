@@ -23,6 +23,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Mounting,
     place: PlaceKind::Joint,
     layer: Layer::Body,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::any("offset_rad"),
         Parameter::any("t_start_s"),

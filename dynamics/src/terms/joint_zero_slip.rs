@@ -24,6 +24,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Mounting,
     place: PlaceKind::Joint,
     layer: Layer::Body,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::any("offset_before_rad"),
         Parameter::any("offset_after_rad"),

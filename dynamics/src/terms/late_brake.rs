@@ -22,6 +22,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::at_least("drag_nm", 0.0),
         Parameter::at_least("release_s", 0.0),

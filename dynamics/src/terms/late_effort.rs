@@ -24,6 +24,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
+    odds_nats: -7.0,
     parameters: &[Parameter::at_least("delay_s", 0.0)],
     coordinates: &[Coordinate {
         name: "delay_s",
@@ -40,6 +41,7 @@ pub(super) static EFFECT: Effect = Effect {
     simulated: Simulated::Record,
     concealed: Some(|_| Drawn::new([1e-3, 0.2], |delay| vec![("delay_s", delay)])),
     traits: Traits {
+        shifts_time: true,
         is_off_list: true,
         bends: true,
         smallest_told_as: Some("delay_s"),

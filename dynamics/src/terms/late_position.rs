@@ -27,6 +27,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Body,
+    odds_nats: -7.0,
     parameters: &[Parameter::at_least("delay_s", 0.0)],
     coordinates: &[Coordinate {
         name: "delay_s",
@@ -45,6 +46,7 @@ pub(super) static EFFECT: Effect = Effect {
     ),
     concealed: None,
     traits: Traits {
+        shifts_time: true,
         is_off_list: true,
         bends: true,
         smallest_told_as: Some("delay_s"),

@@ -33,6 +33,7 @@ pub static EFFECT: Effect = Effect {
     family: Family::Body,
     place: PlaceKind::Link,
     layer: Layer::Body,
+    odds_nats: -3.0,
     parameters: &[
         Parameter::any("delta_com_x_m"),
         Parameter::any("delta_com_y_m"),

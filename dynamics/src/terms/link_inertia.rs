@@ -26,6 +26,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Body,
     place: PlaceKind::Link,
     layer: Layer::Body,
+    odds_nats: -4.0,
     parameters: &[
         Parameter::any("delta_mass_kg"),
         Parameter::any("delta_first_moment_x_kgm"),

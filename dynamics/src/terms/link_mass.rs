@@ -31,6 +31,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Body,
     place: PlaceKind::Link,
     layer: Layer::Body,
+    odds_nats: -4.0,
     parameters: &[Parameter::any("delta_mass_kg")],
     coordinates: &[Coordinate::factor("delta_mass_kg")],
     to_parameters: <[f64]>::to_vec,

@@ -19,6 +19,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -3.0,
     parameters: &[Parameter::ratio("coefficient", 0.0)],
     coordinates: &[Coordinate::positive_factor("coefficient")],
     to_parameters: <[f64]>::to_vec,

@@ -21,6 +21,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -7.0,
     parameters: &[Parameter::at_least("coefficient_per_nm", 0.0)],
     coordinates: &[Coordinate::positive_factor("coefficient_per_nm")],
     to_parameters: <[f64]>::to_vec,

@@ -23,6 +23,7 @@ pub static EFFECT: Effect = Effect {
     family: Family::Body,
     place: PlaceKind::Tool,
     layer: Layer::Body,
+    odds_nats: -2.5,
     parameters: &BODY_PARAMETERS,
     coordinates: &BODY_COORDINATES,
     to_parameters: |c| parameters(&array(c)).to_vec(),

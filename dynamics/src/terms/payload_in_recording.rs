@@ -23,6 +23,7 @@ pub static EFFECT: Effect = Effect {
     family: Family::Body,
     place: PlaceKind::Tool,
     layer: Layer::Body,
+    odds_nats: -7.0,
     parameters: &with_times(
         BODY_PARAMETERS,
         Parameter::any("t_start_s"),

@@ -22,6 +22,7 @@ pub static EFFECT: Effect = Effect {
     family: Family::Body,
     place: PlaceKind::Tool,
     layer: Layer::Body,
+    odds_nats: -4.0,
     parameters: &with_times(
         BODY_PARAMETERS,
         Parameter::any("t_start_s"),

@@ -27,6 +27,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -3.5,
     parameters: &[
         Parameter::at_least("coulomb_nm", 0.0),
         Parameter::at_least("bristle_stiffness_nm_per_rad", 0.0),

@@ -19,6 +19,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -4.0,
     parameters: &[Parameter::at_least("drag_nms2_per_rad2", 0.0)],
     coordinates: &[Coordinate::positive_factor("drag_nms2_per_rad2")],
     to_parameters: <[f64]>::to_vec,

@@ -20,6 +20,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Transmission,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -0.7,
     parameters: &[Parameter::at_least("inertia_kgm2", 0.0)],
     coordinates: &[Coordinate::positive_factor("inertia_kgm2")],
     to_parameters: <[f64]>::to_vec,

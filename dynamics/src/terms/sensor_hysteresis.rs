@@ -29,6 +29,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::at_least("hysteresis_nm", 0.0),
         Parameter::at_least("turning_nm", 0.0),

@@ -25,6 +25,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -1.5,
     parameters: &[
         Parameter::at_least("coulomb_nm", 0.0),
         Parameter::at_least("static_nm", 0.0),

@@ -19,6 +19,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
+    odds_nats: -7.0,
     parameters: &[Parameter::at_least("subtracted_nm", 0.0)],
     coordinates: &[Coordinate::positive_factor("subtracted_nm")],
     to_parameters: <[f64]>::to_vec,

@@ -24,6 +24,7 @@ pub static EFFECT: Effect = Effect {
     family: Family::Unnamed,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -4.0,
     parameters: &[],
     coordinates: &[],
     to_parameters: <[f64]>::to_vec,

@@ -31,6 +31,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -4.0,
     parameters: &[
         Parameter::at_least("viscous_warm_nms_per_rad", 0.0),
         Parameter::at_least("viscous_extra_cold_nms_per_rad", 0.0),

@@ -19,6 +19,7 @@ pub static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
+    odds_nats: -3.0,
     parameters: &[Parameter::any("bias_nm")],
     coordinates: &[Coordinate::factor("bias_nm")],
     to_parameters: <[f64]>::to_vec,

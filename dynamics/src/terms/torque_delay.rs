@@ -21,6 +21,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::All,
     layer: Layer::Record,
+    odds_nats: -3.0,
     parameters: &[Parameter::at_least("delay_s", 0.0)],
     coordinates: &[Coordinate::shape("delay_s", 0.002, 1.0, 12, Scale::Log)],
     to_parameters: <[f64]>::to_vec,
@@ -30,7 +31,10 @@ pub(super) static EFFECT: Effect = Effect {
     excitation: Excitation::Fast,
     simulated: Simulated::Record,
     concealed: Some(|_| Drawn::new([1e-3, 0.2], |delay| vec![("delay_s", delay)])),
-    traits: Traits::NONE,
+    traits: Traits {
+        shifts_time: true,
+        ..Traits::NONE
+    },
     build: |site, values| Delayed::boxed(&EFFECT, site, None, array(values)),
 };
 

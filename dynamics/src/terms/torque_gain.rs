@@ -25,6 +25,7 @@ pub static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
+    odds_nats: -3.0,
     parameters: &[Parameter::ratio("gain", f64::NEG_INFINITY)],
     coordinates: &[Coordinate::factor("gain_excess")],
     to_parameters: |c| vec![1.0 + c[0]],

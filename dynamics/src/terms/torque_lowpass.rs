@@ -22,6 +22,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::All,
     layer: Layer::Record,
+    odds_nats: -4.0,
     parameters: &[Parameter::at_least("cutoff_hz", 1e-3)],
     coordinates: &[Coordinate::shape("cutoff_hz", 0.3, 40.0, 24, Scale::Log)],
     to_parameters: <[f64]>::to_vec,
@@ -35,7 +36,10 @@ pub(super) static EFFECT: Effect = Effect {
             vec![("cutoff_hz", 1.0 / (TAU * time_s))]
         })
     }),
-    traits: Traits::NONE,
+    traits: Traits {
+        shifts_time: true,
+        ..Traits::NONE
+    },
     build: |site, values| Box::new(TorqueLowpass::new(site, array(values))),
 };
 

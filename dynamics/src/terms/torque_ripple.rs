@@ -31,6 +31,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Spring,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -4.5,
     parameters: &[
         Parameter::at_least("amplitude_nm", 0.0),
         Parameter::at_least("cycles_per_rev", 0.0),

@@ -19,6 +19,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
+    odds_nats: -4.0,
     parameters: &[Parameter::at_least("limit_nm", 0.0)],
     coordinates: &[Coordinate::shape("limit_nm", 0.3, 1.0, 15, Scale::OfEffort)],
     to_parameters: <[f64]>::to_vec,

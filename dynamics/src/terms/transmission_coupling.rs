@@ -19,6 +19,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Transmission,
     place: PlaceKind::TwoJoints,
     layer: Layer::Record,
+    odds_nats: -5.0,
     parameters: &[Parameter::ratio("coefficient", f64::NEG_INFINITY)],
     coordinates: &[Coordinate::factor("coefficient")],
     to_parameters: <[f64]>::to_vec,

@@ -22,6 +22,7 @@ pub static EFFECT: Effect = Effect {
     family: Family::PlainFriction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -0.5,
     parameters: &[Parameter::at_least("viscous_nms_per_rad", 0.0)],
     coordinates: &[Coordinate::positive_factor("viscous_nms_per_rad")],
     to_parameters: <[f64]>::to_vec,

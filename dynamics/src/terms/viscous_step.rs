@@ -29,6 +29,7 @@ pub(super) static EFFECT: Effect = Effect {
     family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
+    odds_nats: -7.0,
     parameters: &[
         Parameter::at_least("viscous_before_nms_per_rad", 0.0),
         Parameter::at_least("viscous_after_nms_per_rad", 0.0),

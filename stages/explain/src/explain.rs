@@ -19,10 +19,13 @@ use crate::read::audit;
 use crate::read::excerpt::excerpts;
 use crate::read::input::Input;
 use crate::read::start::Start;
+use crate::report::holdout::Proof;
 use crate::report::remainder::Remainders;
 use crate::report::schema::{Finding, Report, Verdict};
 use crate::report::slips::Slips;
-use crate::report::{findings, handed_out, locate, notes, summary, verdict, without_law};
+use crate::report::{
+    findings, handed_out, locate, notes, predicted, summary, verdict, without_law,
+};
 
 use judged::{Judged, Stop};
 
@@ -54,6 +57,7 @@ pub fn explain(
     } else {
         let mut all = remedies::of_velocity(&input.fit, n);
         all.extend(remedies::of_unmeasured(&input.fit, n));
+        all.extend(remedies::of_dropouts(&input.fit, &joints));
         all.retain(|slip| !slip.remedy.is_without(&input.without));
         Slips::new(all)
     };
@@ -160,12 +164,17 @@ fn attempt(
 /// The report on the result of a search, with the errors on the held-out recordings.
 fn conclude(
     context: &Context<'_>,
-    judged: Judged,
+    mut judged: Judged,
     slips: &Slips,
     joints: &[String],
     progress: &(dyn Fn(f64, &str) + Sync),
 ) -> Result<Outcome, TermError> {
     let input = context.input;
+    progress(0.95, "checking on held-out recordings");
+    let mut proof = context.proof(&judged.problem, &judged.before, &judged.found)?;
+    let unit = if input.effort_unit == "A" { "A" } else { "N m" };
+    let noise_floor = noise_floor(input);
+    let remainders = remainders(context, &mut judged, &mut proof, (&noise_floor, unit))?;
     let Judged {
         problem,
         before,
@@ -173,27 +182,17 @@ fn conclude(
         mut named,
         undetectable,
         rests_count,
+        ..
     } = judged;
-    progress(0.95, "checking on held-out recordings");
-    let mut proof = context.proof(&problem, &before, &found)?;
-    let kept = handed_out::reject(&proof.withheld, &mut named, &problem, &found, joints);
-    let noise_floor = noise_floor(input);
-    let unit = if input.effort_unit == "A" { "A" } else { "N m" };
-    let proved = (&proof.after[..], &named.findings[..]);
-    let remainders = context.remainders((&problem, &kept), &before, &rests_count, unit, proved)?;
-    if !remainders.elsewhere.is_empty() {
-        findings::doubt_patches(&mut named.findings);
-    }
     let mut notes = named.notes;
     notes.extend(context.notes());
     notes.extend(notes::not_handed_out(&proof, &found, &input.model, unit));
-    let remaining = &remainders.all;
     notes.extend(notes::notes(
         input,
         &problem,
         &found,
         &rests_count,
-        remaining,
+        &remainders.all,
     ));
     let mut findings = slips.findings(joints, unit, context.unit_nm);
     notes.splice(0..0, slips.note());
@@ -201,7 +200,7 @@ fn conclude(
     slips.undo(&mut proof);
     let verdict = verdict::verdict(&findings, &remainders, !input.bodies);
     let errors = [&proof.before[..], &proof.after[..]];
-    let has_changed = input.start.is_some();
+    let (remaining, has_changed) = (&remainders.all, input.start.is_some());
     let summary = summary::summary(verdict, &findings, remaining, joints, errors, has_changed);
     findings.extend(without_law(input, &remainders, &findings));
     let report = Report {
@@ -235,6 +234,37 @@ fn conclude(
         pictures: proof.pictures,
         trajectories: named.trajectories,
     })
+}
+
+/// The residual that is more than noise. A finding that the held-out recordings refute is rejected, unless the residual was
+/// tested on the fitted recordings alone.
+fn remainders(
+    context: &Context<'_>,
+    judged: &mut Judged,
+    proof: &mut Proof,
+    (noise, unit): (&[f64], &str),
+) -> Result<Remainders, TermError> {
+    let (problem, model) = (&judged.problem, &context.input.model);
+    if let Some(predicted) = &judged.remaining {
+        proof.withheld.clear();
+        let units = (noise, context.unit_nm, unit);
+        return Ok(predicted::remainders(
+            model,
+            &judged.found,
+            predicted,
+            units,
+        ));
+    }
+    let joints: Vec<String> = model.joint_names().map(str::to_owned).collect();
+    let named = &mut judged.named;
+    let kept = handed_out::reject(&proof.withheld, named, problem, &judged.found, &joints);
+    let proved = (&proof.after[..], &named.findings[..]);
+    let found = (problem, &kept);
+    let all = context.remainders(found, &judged.before, &judged.rests_count, unit, proved)?;
+    if !all.elsewhere.is_empty() {
+        findings::doubt_patches(&mut named.findings);
+    }
+    Ok(all)
 }
 
 /// Findings for what remains at a joint. What another simulation leaves there may be its own.

@@ -7,6 +7,7 @@ mod fit;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod fixture;
+mod inference;
 mod measure;
 mod outcome;
 mod physics;
@@ -17,7 +18,7 @@ mod select;
 pub use explain::explain;
 pub use measure::{Measured, Number, measure};
 pub use outcome::Outcome;
-pub use read::input::Input;
+pub use read::input::{Input, Method};
 pub use read::recording::{Losses, Recording, RecordingTopics};
 pub use read::start::Start;
 pub use report::html;

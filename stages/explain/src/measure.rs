@@ -251,6 +251,7 @@ mod tests {
             holdout: Vec::new(),
             start: None,
             without: std::collections::BTreeSet::new(),
+            method: crate::read::input::Method::default(),
         }
     }
 

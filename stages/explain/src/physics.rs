@@ -20,3 +20,4 @@ pub mod shaped_bodies;
 pub mod start;
 pub mod torque_scale;
 pub mod unit_columns;
+pub mod whereabouts;

@@ -1,5 +1,6 @@
 //! What would make recordings match that do not match the robot: each remedy of a short list is tried on the data.
 
+mod dropouts;
 mod mend;
 mod scale;
 mod trial;
@@ -12,6 +13,7 @@ use tauscope_dynamics::JointKind;
 
 use crate::data::problem::Problem;
 
+pub use dropouts::of_dropouts;
 pub use scale::of_scale;
 use trial::{Left, Trial};
 pub use unmeasured::of_unmeasured;
@@ -67,6 +69,8 @@ pub enum Remedy {
     ConstantsWrong,
     /// The effort of a joint is one number throughout: it is left out.
     Unmeasured(usize, f64),
+    /// The effort of a joint drops to exactly zero in this many messages: their rows are left out.
+    DropsOut(usize, u64),
     /// The recorded velocity is so many times the change of position: of a joint, or of all.
     Velocity(Option<usize>, f64),
 }
@@ -89,6 +93,7 @@ impl Remedy {
             Self::ConstantsScaled(_) | Self::ConstantsWrong => "torque_constant",
             Self::Velocity(..) => "velocity_scale",
             Self::Unmeasured(..) => "effort_constant",
+            Self::DropsOut(..) => "effort_dropout",
             Self::BaseTurned(_) | Self::Payload(_) => return None,
         })
     }

@@ -262,6 +262,7 @@ impl Context<'_> {
             undetectable,
             rests_count,
             problem,
+            remaining: None,
         }))
     }
 }

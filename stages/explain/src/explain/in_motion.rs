@@ -9,8 +9,10 @@ use crate::data::remedies::{self, Remedy, Slip};
 use crate::data::same_robot::Likeness;
 use crate::explain::judged::{Judged, Stop};
 use crate::fit::fitted::Fit;
+use crate::inference::infer;
 use crate::physics::active::{Active, Hypothesis};
 use crate::physics::{library, torque_scale};
+use crate::read::input::Method;
 use crate::report::findings;
 use crate::select::propose::penalty;
 use crate::select::search::Search;
@@ -47,9 +49,12 @@ impl Context<'_> {
             say: &say,
         };
         let (start, penalties) = started(&search, scales(), turn, input.bodies);
+        if input.method == Method::Inference {
+            return Ok(Ok(self.inferred(&search, start, scales())));
+        }
         let moving = search.first_guess(start, penalties);
         // Without set-valued friction, standstills are as informative as motion.
-        progress(0.3, "standstills");
+        progress(0.3, "comparing standstills");
         let dry = (input.start.as_ref()).map_or_else(
             // Another simulation has friction of its own, and says nothing where the real one holds.
             || vec![!input.bodies; joints.len()],
@@ -75,7 +80,7 @@ impl Context<'_> {
             say: &say,
         };
         let found = search.run(moving.fit.actives, moving.penalties);
-        progress(0.8, "rivals");
+        progress(0.8, "comparing alternative explanations");
         let before = Fit::new(&problem, scales()).refined(&problem);
         let named = findings::of(&search, &found, &before, self, &joints);
         let undetectable = findings::undetectable(&search, &found, self, &joints);
@@ -86,7 +91,30 @@ impl Context<'_> {
             undetectable,
             rests_count,
             problem,
+            remaining: None,
         }))
+    }
+
+    /// The explanation by inference.
+    fn inferred(&self, search: &Search<'_>, start: Vec<Active>, scales: Vec<Active>) -> Judged {
+        let problem = search.problem;
+        let joints: Vec<String> = problem.model.joint_names().map(str::to_owned).collect();
+        let hypotheses = [search.hypotheses, search.unnamed_bodies].concat();
+        let inferred = infer(problem, &hypotheses, start, self.input.bodies, search.say);
+        let before = Fit::new(problem, scales).refined(problem);
+        let named = findings::of_inferred(search, &inferred, &before, self, &joints);
+        // Predictions have the bodies' mean changes, too, which are too small for a finding.
+        let mut actives = inferred.fit.actives;
+        actives.extend(inferred.bodies);
+        Judged {
+            before,
+            found: Fit::new(problem, actives),
+            named,
+            undetectable: Vec::new(),
+            remaining: Some(inferred.remaining),
+            rests_count: vec![false; joints.len()],
+            problem: problem.clone(),
+        }
     }
 
     /// The turn of the base that the efforts ask for, if any.

@@ -3,6 +3,7 @@
 use crate::data::problem::Problem;
 use crate::data::remedies::Slip;
 use crate::fit::fitted::Fit;
+use crate::inference::remainder::Predicted;
 use crate::report::findings::Named;
 use crate::report::schema::Undetectable;
 
@@ -18,6 +19,8 @@ pub struct Judged {
     pub named: Named,
     /// The smallest effects that would have been found.
     pub undetectable: Vec<Undetectable>,
+    /// Features that predict the residual of the fitted recordings, if that was tested.
+    pub remaining: Option<Vec<Predicted>>,
     /// By joint, whether its standstills are compared.
     pub rests_count: Vec<bool>,
 }

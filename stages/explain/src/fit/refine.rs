@@ -212,7 +212,7 @@ impl Fit {
 }
 
 /// Lowest and highest value of a coordinate.
-fn bounds(problem: &Problem, active: &Active, c: usize) -> (f64, f64) {
+pub(crate) fn bounds(problem: &Problem, active: &Active, c: usize) -> (f64, f64) {
     match active.kind(c) {
         CoordinateKind::Factor { minimum, .. } => {
             (least(problem, active.hypothesis, minimum), f64::INFINITY)

@@ -1,40 +1,14 @@
 //! One effect of an explanation: its kind, its place and its numbers.
 
 use tauscope_dynamics::terms::{
-    Against, Coordinate, CoordinateKind, Effect, Family, Layer, MotionSample, PlaceKind, Site,
-    Table, Term, table,
+    Against, Coordinate, CoordinateKind, Effect, Family, Layer, MotionSample, PlaceKind, Table,
+    Term, table,
 };
 use tauscope_dynamics::{Inertia, Model};
 
 pub use tauscope_dynamics::terms::Time as TimeKind;
 
-/// Where an effect acts: indices into the model's joints and links. Indices that its kind of place does not use are 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-pub struct Whereabouts {
-    /// The joint.
-    pub joint: usize,
-    /// The joint whose effort is coupled into it.
-    pub source: usize,
-    /// The link.
-    pub link: usize,
-}
-
-impl Whereabouts {
-    /// The same in a robot.
-    pub fn site(self, model: &Model) -> Site<'_> {
-        let Self {
-            joint,
-            source,
-            link,
-        } = self;
-        Site {
-            model,
-            joint,
-            source,
-            link,
-        }
-    }
-}
+pub use crate::physics::whereabouts::Whereabouts;
 
 /// Number of inertial parameters of a body.
 /// Physical: a mass, three first moments of mass, and six elements of the inertia tensor.
@@ -138,6 +112,11 @@ impl Hypothesis {
         self.effect.name == TORQUE_SCALE
     }
 
+    /// Whether it adds what one joint does to another joint's effort.
+    pub fn is_coupling(&self) -> bool {
+        self.effect.place == PlaceKind::TwoJoints
+    }
+
     /// Whether it splits a joint into rotor and link. Such effects take long to evaluate.
     pub fn has_rotor(&self) -> bool {
         self.effect.splits_joint()
@@ -146,6 +125,17 @@ impl Hypothesis {
     /// Whether it is Coulomb or viscous friction.
     pub fn is_plain_friction(&self) -> bool {
         self.effect.is_plain_friction()
+    }
+
+    /// Whether every joint with a gear has it: plain friction and a rotor.
+    pub fn is_ordinary(&self) -> bool {
+        let is_rotor = self.effect.family == Family::Transmission && self.is_linear();
+        self.is_plain_friction() || is_rotor && self.only_joint() == Some(self.place.joint)
+    }
+
+    /// Whether it shifts efforts or positions in time.
+    pub fn is_of_timing(&self) -> bool {
+        self.effect.traits.shifts_time
     }
 
     /// Whether it shifts the zero of a joint.
@@ -275,7 +265,7 @@ impl Active {
 
     /// Whether it couples the effort of one joint into another's recording.
     pub fn is_coupling(&self) -> bool {
-        self.hypothesis.effect.place == PlaceKind::TwoJoints
+        self.hypothesis.is_coupling()
     }
 
     /// Its coordinates with all factors at zero.

@@ -21,6 +21,7 @@ pub static EFFECT: Effect = Effect {
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Body,
+    odds_nats: 0.0,
     parameters: &[Parameter::ratio("gain", f64::NEG_INFINITY)],
     coordinates: &[Coordinate::factor("gain_minus_one")],
     to_parameters: |c| vec![1.0 + c[0]],

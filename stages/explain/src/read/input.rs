@@ -7,6 +7,17 @@ use tauscope_dynamics::Model;
 use crate::read::recording::Recording;
 use crate::read::start::Start;
 
+/// Search for effects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// By evidence, one addition or exchange at a time.
+    #[default]
+    Stepwise,
+    /// By the marginal likelihood of whole explanations, with the usual errors of bodies, laws and stamps in the model. It is to
+    /// replace the other one.
+    Inference,
+}
+
 /// The input of an explanation.
 #[derive(Debug)]
 pub struct Input {
@@ -28,4 +39,6 @@ pub struct Input {
     pub start: Option<Start>,
     /// Effects that are left out of the library.
     pub without: BTreeSet<String>,
+    /// Search for effects.
+    pub method: Method,
 }

@@ -111,7 +111,9 @@ impl Report {
     /// Whether there is a corrected twin for a pipeline. One of mended recordings would not fit what the robot publishes;
     /// a pipeline does not use a velocity that is not the derivative of the position.
     pub fn hands_out_twin(&self) -> bool {
-        let unfit = |finding: &Finding| finding.is_slip() && !finding.is_of_velocity();
+        let unfit = |finding: &Finding| {
+            finding.is_slip() && !finding.is_of_velocity() && finding.known_as() != "effort_dropout"
+        };
         self.verdict != Verdict::NotEvaluated && !self.findings.iter().any(unfit)
     }
 }

@@ -17,7 +17,7 @@ pub fn recording_faults() -> impl Iterator<Item = &'static str> {
 }
 
 /// All kinds of faults, by the `kind` of their findings.
-static KINDS: [(&str, SlipWords); 12] = [
+static KINDS: [(&str, SlipWords); 13] = [
     (
         "efforts_swapped",
         SlipWords {
@@ -40,6 +40,14 @@ static KINDS: [(&str, SlipWords); 12] = [
             title: "Effort that never changes",
             meaning: "The effort of a joint is one number while the joint moves: it is no measurement.",
             look_at: "Joint {place}: its torque sensor, or what the driver fills in where it measures nothing.",
+        },
+    ),
+    (
+        "effort_dropout",
+        SlipWords {
+            title: "Effort that drops out",
+            meaning: "The effort of a joint is exactly zero for moments while its neighbours in time are not: it is not measured then.",
+            look_at: "Joint {place}: the plug and the cable of its sensor.",
         },
     ),
     (

@@ -56,7 +56,8 @@ impl Slips {
 
     /// That all else is of mended recordings.
     pub fn note(&self) -> Option<String> {
-        let of_velocity = |slip: &Slip| matches!(slip.remedy, Remedy::Velocity(..));
+        let of_velocity =
+            |slip: &Slip| matches!(slip.remedy, Remedy::Velocity(..) | Remedy::DropsOut(..));
         let twin = if self.all.iter().all(of_velocity) {
             "A pipeline computes velocities from the positions, so the corrected twin holds there."
         } else {
@@ -146,7 +147,8 @@ fn joints_of(remedy: &Remedy) -> (Option<usize>, Option<usize>) {
         | Remedy::EffortWithoutSign(j)
         | Remedy::PositionTurned(j)
         | Remedy::JointTurned(j)
-        | Remedy::Unmeasured(j, _) => (Some(j), None),
+        | Remedy::Unmeasured(j, _)
+        | Remedy::DropsOut(j, _) => (Some(j), None),
         Remedy::Velocity(joint, _) => (joint, None),
         _ => (None, None),
     }
@@ -218,15 +220,8 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
             ),
             format!("Divide it by {} in the driver.", number(factor)),
         ),
-        Remedy::Unmeasured(joint, effort) => (
-            format!(
-                "The effort of {} stays the same through each recording, such as {} {unit}, while the joint moves: nothing \
-                 measures it, and nothing is said of the joint.",
-                name(joint),
-                number(effort)
-            ),
-            "Look at its sensor, or at what the driver fills in.".to_owned(),
-        ),
+        Remedy::Unmeasured(joint, effort) => unmeasured(name(joint), effort, unit),
+        Remedy::DropsOut(joint, messages) => drops_out(name(joint), messages),
         Remedy::BaseTurned(_) | Remedy::Payload(_) => (String::new(), String::new()),
     };
     let evidence = evidence(slip, joints, unit);
@@ -241,6 +236,28 @@ fn without_sign(joint: &str) -> (String, String) {
     );
     let cure = "Let the driver publish the effort with its sign.".to_owned();
     (wrong, cure)
+}
+
+/// The words for an effort that never changes: the fault and its remedy.
+fn unmeasured(joint: &str, effort: f64, unit: &str) -> (String, String) {
+    let wrong = format!(
+        "The effort of {joint} stays the same through each recording, such as {} {unit}, while the joint moves: nothing \
+         measures it, and nothing is said of the joint.",
+        number(effort)
+    );
+    let cure = "Look at its sensor, or at what the driver fills in.";
+    (wrong, cure.to_owned())
+}
+
+/// The words for an effort that drops to zero for moments: the fault and its remedy.
+fn drops_out(joint: &str, messages: u64) -> (String, String) {
+    let wrong = format!(
+        "The effort of {joint} drops to exactly zero for moments, in {messages} messages; their rows are left out."
+    );
+    (
+        wrong,
+        "Check the plug and the cable of its sensor.".to_owned(),
+    )
 }
 
 /// How far off torque constants are that must be multiplied by `factor`.

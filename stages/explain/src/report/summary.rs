@@ -59,7 +59,8 @@ fn proof(joints: &[String], [before, after]: [&[f64]; 2]) -> String {
         return String::new();
     }
     let all = if left < 0.01 {
-        " On recordings that were not fitted the error (RMS) falls to less than 1 % of what it was.".to_owned()
+        " On recordings that were not fitted the error (RMS) falls to less than 1 % of what it was."
+            .to_owned()
     } else if left < UNCHANGED {
         format!(
             " On recordings that were not fitted the error (RMS) falls to {:.0} % of what it was.",

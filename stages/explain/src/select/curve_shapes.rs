@@ -146,7 +146,7 @@ impl Base<'_> {
 }
 
 /// The effort of a unit at each free knot of a curve, in addition to the effects of `fit`.
-fn knot_columns(problem: &Problem, fit: &Fit, curve: &Active) -> Vec<Column> {
+pub(crate) fn knot_columns(problem: &Problem, fit: &Fit, curve: &Active) -> Vec<Column> {
     let free = curve.coordinates.len();
     let unit = |k: usize| {
         let mut unit = curve.clone();

@@ -1,0 +1,295 @@
+//! Explanation by inference: one model of the data, one number that compares explanations, one search, one posterior.
+//!
+//! The effort of a joint is that of the nominal twin, plus the effects of an explanation, plus nuisances that every real
+//! arm has ([`nuisance`]), plus white and slow noise ([`noise`]). [`objective`] is the marginal likelihood of an
+//! explanation with its prior, in which the effects are tangents at the last explanation ([`variants`]). [`search`] looks
+//! for the best explanation, [`refine`] finds its most probable numbers, and the next round begins there.
+
+mod margins;
+mod noise;
+mod nuisance;
+mod objective;
+mod prior;
+mod refine;
+pub mod remainder;
+mod rows;
+mod search;
+mod space;
+mod state;
+mod variants;
+
+use nalgebra::DMatrix;
+use tauscope_dynamics::terms::{Layer, Time};
+
+use crate::data::column::Column;
+use crate::data::problem::Problem;
+use crate::fit::fitted::Fit;
+use crate::physics::active::{Active, Hypothesis};
+
+use margins::{Alternative, margins};
+use nuisance::{Nuisance, Source};
+use objective::{Objective, Set};
+use refine::Solution;
+use space::Space;
+use state::State;
+use variants::Variant;
+
+/// Most rounds of linearising, estimating the noise and searching. Resolution: bounds the computing time.
+const ROUNDS: usize = 6;
+/// An explanation and what is known of it.
+#[derive(Debug)]
+pub struct Inferred {
+    /// The effects with their most probable numbers.
+    pub fit: Fit,
+    /// Covariance of all coordinates.
+    pub covariance: DMatrix<f64>,
+    /// By effect, how much the explanation loses without it, whatever takes its place \[nats\].
+    pub margins: Vec<f64>,
+    /// By effect, other effects that would take its place, best first.
+    pub alternatives: Vec<Vec<Alternative>>,
+    /// Mean changes of the links' inertial parameters, as effects.
+    pub bodies: Vec<Active>,
+    /// Features of the motion that predict what is left.
+    pub remaining: Vec<remainder::Predicted>,
+}
+
+/// Searches for the effects of a problem, from the effects `start` on. `bodies` says whether the robot's bodies are known.
+pub fn infer(
+    problem: &Problem,
+    hypotheses: &[Hypothesis],
+    start: Vec<Active>,
+    bodies: bool,
+    say: &dyn Fn(&str),
+) -> Inferred {
+    let mut state = State::new(problem, bodies);
+    let mut fit = Fit::new(problem, start);
+    let mut history: Vec<Vec<Hypothesis>> = Vec::new();
+    let mut round = 0;
+    loop {
+        say("comparing explanations");
+        let sizes = state.sizes(&fit);
+        let nuisances = nuisance::of(problem, &fit, &sizes, bodies, state.scales);
+        let given = variants::all(problem, &fit, hypotheses, &state.efforts);
+        let measured = variants::measured(problem, &fit);
+        state.estimate_noise(&fit, &nuisances, &given, &measured, round == 0);
+        let space = state.space(&nuisances);
+        let objective = Objective::new(&space, &measured, given);
+        let own: Set = (0..fit.actives.len()).collect();
+        let (found, is_partial) =
+            first_that_bends(&objective, &own, search::search(&objective, own.clone()));
+        let solution = without_idle(
+            problem,
+            &space,
+            &state,
+            refined(problem, &space, &objective, &found),
+        );
+        let effects: Vec<Hypothesis> = solution.fit.actives.iter().map(|a| a.hypothesis).collect();
+        round += 1;
+        let is_settled = !is_partial && history.contains(&effects);
+        if is_settled || round == ROUNDS {
+            let (margins, alternatives) = margins(&objective, &found, &effects);
+            return Inferred {
+                covariance: solution.covariance,
+                margins,
+                alternatives,
+                bodies: mean_bodies(&nuisances, solution.nuisances.as_slice()),
+                remaining: remaining(problem, &space, &solution.fit, &state.efforts),
+                fit: solution.fit,
+            };
+        }
+        fit = solution.fit;
+        state.estimate_scales(&fit, &sizes);
+        state.mark_tail(&space, &fit);
+        history.push(effects);
+    }
+}
+
+/// The set with only one new effect whose effort is not linear in its numbers and that several joints feel, and whether any
+/// was left for later: such effects imitate each other until the numbers of one are refined.
+fn first_that_bends(objective: &Objective<'_>, own: &Set, found: Set) -> (Set, bool) {
+    let bends = |v: &usize| {
+        let hypothesis = objective.variants[*v].hypothesis;
+        let effect = hypothesis.effect;
+        let is_shaped = !hypothesis.is_linear() && effect.time() == Time::Always;
+        effect.layer == Layer::Body && (is_shaped || effect.traits.bends)
+    };
+    let new: Vec<usize> = found
+        .iter()
+        .copied()
+        .filter(|v| !own.contains(v) && bends(v))
+        .collect();
+    if new.len() < 2 {
+        return (found, false);
+    }
+    let score_without = |v: usize| {
+        let less: Set = found.iter().copied().filter(|w| *w != v).collect();
+        objective.score(&less)
+    };
+    let needed = new
+        .iter()
+        .copied()
+        .min_by(|&a, &b| score_without(a).total_cmp(&score_without(b)));
+    let kept = |v: &usize| !new.contains(v) || Some(*v) == needed;
+    (found.into_iter().filter(kept).collect(), true)
+}
+
+/// The numbers of a set, refined.
+fn refined(problem: &Problem, space: &Space, objective: &Objective<'_>, set: &Set) -> Solution {
+    let factors = objective.factors(set);
+    let own = set.iter().map(|&v| &objective.variants[v]);
+    let actives = own
+        .clone()
+        .zip(&factors)
+        .map(|(variant, factors)| variant.with(factors));
+    let fit = Fit::new(problem, actives.collect());
+    let deviations: Vec<f64> = own.flat_map(Variant::all_deviations).collect();
+    refine::refine(problem, space, fit, &deviations)
+}
+
+/// A solution without the effects that its refined numbers leave nothing to do.
+fn without_idle(
+    problem: &Problem,
+    space: &Space,
+    state: &State<'_>,
+    mut solution: Solution,
+) -> Solution {
+    loop {
+        let given = variants::of_fit(problem, &solution.fit, &state.efforts);
+        if given.len() < solution.fit.actives.len() {
+            return solution;
+        }
+        let own = Objective::new(space, &variants::measured(problem, &solution.fit), given);
+        let all: Set = (0..own.variants.len()).collect();
+        let kept = search::without_idle(&own, all.clone());
+        if kept == all {
+            return solution;
+        }
+        solution = refined(problem, space, &own, &kept);
+    }
+}
+
+/// Features of the motion that predict what a fit leaves in recordings that it was not fitted on.
+fn remaining(
+    problem: &Problem,
+    space: &Space,
+    fit: &Fit,
+    efforts: &[f64],
+) -> Vec<remainder::Predicted> {
+    let mut measured = Column {
+        joint: None,
+        values: fit.residual.clone(),
+    };
+    let mut columns = Vec::new();
+    for (given, active) in variants::of_fit(problem, fit, efforts)
+        .iter()
+        .zip(&fit.actives)
+    {
+        let factors = given.variant.factors_of(active);
+        let all = factors
+            .iter()
+            .zip(&given.variant.deviations)
+            .zip(&given.factors);
+        for ((factor, deviation), column) in all {
+            let first = column.joint.map_or(0, |joint| joint * problem.rows);
+            for (value, x) in measured.values[first..].iter_mut().zip(&column.values) {
+                *value += factor * x;
+            }
+            let values = column.values.iter().map(|x| deviation * x).collect();
+            columns.push(Column {
+                joint: column.joint,
+                values,
+            });
+        }
+    }
+    let residuals = space.left_out(&columns, &measured, problem.tracks.len());
+    let of_joint = |joint: usize| {
+        let accelerations =
+            |r: usize, k: usize| problem.tracks[r].track.acceleration[k * problem.joints + joint];
+        let acceleration = nuisance::column_of(problem, joint, accelerations);
+        let curves = nuisance::curves(problem, fit, joint).into_iter();
+        let curves = curves.map(|curve| (curve.of, curve.columns));
+        let all = curves.chain([("acceleration", vec![acceleration])]);
+        let feature = move |(name, columns): (&'static str, Vec<Column>)| remainder::Feature {
+            name,
+            joint,
+            columns: columns.into_iter().map(|column| column.values).collect(),
+        };
+        all.map(feature).collect::<Vec<_>>()
+    };
+    let features: Vec<remainder::Feature> = (0..problem.joints).flat_map(of_joint).collect();
+    remainder::predicted(space, &residuals, &features)
+}
+
+/// The mean changes of the links' inertial parameters.
+fn mean_bodies(nuisances: &[Nuisance], means: &[f64]) -> Vec<Active> {
+    let mut all: Vec<Active> = Vec::new();
+    for (nuisance, mean) in nuisances.iter().zip(means) {
+        let Source::Body { link, parameters } = nuisance.source else {
+            continue;
+        };
+        let Some(hypothesis) = nuisance::body_hypothesis(link) else {
+            continue;
+        };
+        let at = all
+            .iter()
+            .position(|active| active.hypothesis == hypothesis);
+        let at = at.unwrap_or_else(|| {
+            all.push(hypothesis.with(vec![0.0; parameters.len()]));
+            all.len() - 1
+        });
+        for (x, parameter) in all[at].coordinates.iter_mut().zip(&parameters) {
+            *x += mean * parameter;
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::fixture::problem_with;
+    use crate::physics::library;
+
+    fn effects(
+        add: impl FnMut(&[f64], &[f64], &mut [f64]),
+    ) -> Vec<(&'static str, usize, Vec<f64>)> {
+        let problem = problem_with(3, add);
+        let hypotheses = library::hypotheses(&problem.model, true, &BTreeSet::new());
+        let inferred = infer(&problem, &hypotheses, Vec::new(), true, &|_| {});
+        assert!(inferred.remaining.is_empty(), "{:?}", inferred.remaining);
+        let actives = inferred.fit.actives.iter();
+        let of = |a: &Active| {
+            (
+                a.hypothesis.effect.name,
+                a.hypothesis.place.joint,
+                a.parameters(),
+            )
+        };
+        actives.map(of).collect()
+    }
+
+    #[test]
+    fn an_arm_as_its_urdf_says_has_no_effects() {
+        assert_eq!(effects(|_, _, _| {}), []);
+    }
+
+    #[test]
+    fn friction_of_two_kinds_is_found_with_its_numbers() {
+        let found = effects(|_, qd, effort| {
+            effort[0] += 1.2 * qd[0];
+            effort[1] += 0.8 * qd[1].signum();
+        });
+        let at = |name: &str| {
+            let one = found.iter().find(|(effect, _, _)| *effect == name);
+            one.map(|(_, joint, parameters)| (*joint, parameters[0]))
+        };
+        let near = |found: Option<(usize, f64)>, joint: usize, value: f64| {
+            found.is_some_and(|(at, x)| at == joint && (x / value - 1.0).abs() < 0.1)
+        };
+        assert!(near(at("viscous_friction"), 0, 1.2), "{found:?}");
+        assert!(near(at("coulomb_friction"), 1, 0.8), "{found:?}");
+        assert_eq!(found.len(), 2, "{found:?}");
+    }
+}

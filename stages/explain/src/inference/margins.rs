@@ -1,0 +1,60 @@
+//! How much an explanation needs each of its effects, and what could take its place.
+
+use crate::physics::active::Hypothesis;
+
+use super::objective::{Objective, Set};
+use super::variants::simplest;
+
+/// Alternatives that are kept of each effect. Resolution: reports list three.
+const KEPT: usize = 5;
+
+/// An effect that could take the place of another.
+#[derive(Debug, Clone, Copy)]
+pub struct Alternative {
+    /// The effect and its place.
+    pub hypothesis: Hypothesis,
+    /// How much worse the explanation is with it \[nats\].
+    pub behind: f64,
+}
+
+/// For each of the `effects` of a set: what is lost without it, whatever takes its place, and what that could be.
+pub fn margins(
+    objective: &Objective<'_>,
+    set: &Set,
+    effects: &[Hypothesis],
+) -> (Vec<f64>, Vec<Vec<Alternative>>) {
+    let whole = objective.score(set);
+    let of = |own: &Hypothesis| {
+        let Some(&v) = set
+            .iter()
+            .find(|&&v| objective.variants[v].hypothesis == *own)
+        else {
+            return (0.0, Vec::new());
+        };
+        let less: Set = set.iter().copied().filter(|w| *w != v).collect();
+        let score = objective.score(&less);
+        let gains = objective
+            .additions_of(&less, objective.related(v))
+            .into_iter();
+        let mut others: Vec<Alternative> = gains
+            .map(|(w, gain)| Alternative {
+                hypothesis: objective.variants[w].hypothesis,
+                behind: whole - score - gain,
+            })
+            .filter(|other| other.behind.is_finite() && other.hypothesis != *own)
+            .collect();
+        others.sort_by(|a, b| a.behind.total_cmp(&b.behind));
+        others.dedup_by(|a, b| a.hypothesis == b.hypothesis);
+        // Laws that nest are one finding at one place.
+        let nests = |other: &Alternative| {
+            other.hypothesis.place == own.place && simplest(other.hypothesis) == simplest(*own)
+        };
+        let rival = others.iter().find(|other| !nests(other));
+        let margin = rival
+            .map_or(f64::INFINITY, |rival| rival.behind)
+            .min(whole - score);
+        others.truncate(KEPT);
+        (margin, others)
+    };
+    effects.iter().map(of).unzip()
+}

@@ -1,0 +1,334 @@
+//! The one number that compares explanations: the logarithm of their marginal likelihood and prior.
+//!
+//! With whitened measurement y, columns X scaled by their prior standard deviations, and nuisances Z, all coefficients are
+//! standard normal beforehand and are integrated out in closed form (Rasmussen and Williams, *Gaussian Processes for
+//! Machine Learning*, 2006, section 2.7). Products are formed once; comparing explanations needs no recordings.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::data::column::Column;
+use crate::select::parallel;
+
+use super::space::{Space, Whitened};
+use super::variants::{Given, Variant};
+
+/// Correlation of two columns from which on one may take the place of the other. Resolution: changes the computing time.
+const RELATED: f64 = 0.3;
+
+/// An explanation: indices of variants, ascending.
+pub type Set = Vec<usize>;
+
+/// The objective: see the module.
+pub struct Objective<'a> {
+    space: &'a Space,
+    /// Hypotheses at the shapes that are tried.
+    pub variants: Vec<Variant>,
+    columns: Vec<Whitened>,
+    gram: Vec<OnceLock<Vec<f64>>>,
+    /// Products within each variant: offset first, if it has one.
+    own: Vec<DMatrix<f64>>,
+    /// Square of each column, nuisances projected out.
+    squares: Vec<f64>,
+    related: Vec<OnceLock<Vec<usize>>>,
+    scores: Mutex<HashMap<Set, f64>>,
+}
+
+/// What is known of a set, for trying additions.
+struct Base {
+    set: Set,
+    lower: DMatrix<f64>,
+    /// Columns of the set, without offsets.
+    index: Vec<usize>,
+    offsets: Vec<usize>,
+    solved: DVector<f64>,
+}
+
+impl<'a> Objective<'a> {
+    /// The objective for a measurement, a signal, and the columns of variants.
+    pub fn new(space: &'a Space, measured: &Column, given: Vec<Given>) -> Self {
+        let measured = space.measured(measured);
+        let whiten = |given: &Given| {
+            let offset = given
+                .alone
+                .iter()
+                .map(|column| space.column(column, 1.0, &measured));
+            let factors = given.factors.iter().zip(&given.variant.deviations);
+            let factors =
+                factors.map(|(column, deviation)| space.column(column, *deviation, &measured));
+            offset.chain(factors).collect::<Vec<Whitened>>()
+        };
+        let whitened = parallel::map(&given, whiten);
+        let mut objective = Self {
+            space,
+            variants: Vec::new(),
+            columns: Vec::new(),
+            gram: Vec::new(),
+            own: Vec::new(),
+            squares: Vec::new(),
+            related: Vec::new(),
+            scores: Mutex::default(),
+        };
+        for (given, columns) in given.into_iter().zip(whitened) {
+            let mut variant = given.variant;
+            let at = objective.columns.len();
+            variant.offset = given.alone.is_some().then_some(at);
+            variant.first = at + usize::from(given.alone.is_some());
+            let product = |a: &Whitened, b: &Whitened| space.product(a, b);
+            let m = columns.len();
+            objective
+                .squares
+                .extend(columns.iter().map(|c| product(c, c)));
+            objective.related.push(OnceLock::new());
+            objective.own.push(DMatrix::from_fn(m, m, |a, b| {
+                product(&columns[a], &columns[b])
+            }));
+            objective.columns.extend(columns);
+            objective.variants.push(variant);
+        }
+        objective.gram = (0..objective.columns.len())
+            .map(|_| OnceLock::new())
+            .collect();
+        objective
+    }
+
+    /// Products of one column with all.
+    fn gram(&self, column: usize) -> &[f64] {
+        self.gram[column].get_or_init(|| {
+            let a = &self.columns[column];
+            let of = |b: &Whitened| self.space.product(a, b);
+            self.columns.iter().map(of).collect()
+        })
+    }
+
+    fn base(&self, set: &Set) -> Option<Base> {
+        let variants = || set.iter().map(|&v| &self.variants[v]);
+        let index: Vec<usize> = variants().flat_map(Variant::columns).collect();
+        let offsets: Vec<usize> = variants().filter_map(|v| v.offset).collect();
+        let p = index.len();
+        let mut normal = DMatrix::zeros(p, p);
+        let mut right = DVector::zeros(p);
+        for (a, &i) in index.iter().enumerate() {
+            let row = self.gram(i);
+            for (b, &j) in index.iter().enumerate() {
+                normal[(a, b)] = row[j];
+            }
+            normal[(a, a)] += 1.0;
+            right[a] = self.columns[i].right - offsets.iter().map(|&o| row[o]).sum::<f64>();
+        }
+        let factor = normal.cholesky()?;
+        let lower = factor.l();
+        lower.solve_lower_triangular_mut(&mut right);
+        Some(Base {
+            set: set.clone(),
+            lower,
+            index,
+            offsets,
+            solved: right,
+        })
+    }
+
+    /// The value of a set \[nats\], up to a constant that all sets share.
+    pub fn score(&self, set: &Set) -> f64 {
+        let lock = || self.scores.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = lock().get(set) {
+            return *known;
+        }
+        let score = self
+            .base(set)
+            .map_or(f64::NEG_INFINITY, |base| self.of_base(&base));
+        lock().insert(set.clone(), score);
+        score
+    }
+
+    fn of_base(&self, base: &Base) -> f64 {
+        let mut score = 0.5 * base.solved.norm_squared();
+        score -= base.lower.diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        for &o in &base.offsets {
+            let row = self.gram(o);
+            score +=
+                self.columns[o].right - 0.5 * base.offsets.iter().map(|&p| row[p]).sum::<f64>();
+        }
+        score += base
+            .set
+            .iter()
+            .map(|&v| self.variants[v].log_prior)
+            .sum::<f64>();
+        // A factor that cannot be negative has a half-normal prior: the share of the posterior above zero counts twice.
+        let (mean, inverse) = mean_and_inverse(base);
+        let mut at = 0;
+        for &v in &base.set {
+            for positive in &self.variants[v].positive {
+                if *positive {
+                    let deviation = inverse.row(at).norm();
+                    score += log_twice_share_above_zero(mean[at] / deviation);
+                }
+                at += 1;
+            }
+        }
+        score
+    }
+
+    /// Posterior means of the factors of a set, variant by variant.
+    pub fn factors(&self, set: &Set) -> Vec<Vec<f64>> {
+        let Some(base) = self.base(set) else {
+            return set
+                .iter()
+                .map(|&v| vec![0.0; self.variants[v].deviations.len()])
+                .collect();
+        };
+        let (mean, _) = mean_and_inverse(&base);
+        let mut at = 0;
+        let of = |&v: &usize| {
+            let own = &self.variants[v];
+            let values = own.deviations.iter().enumerate();
+            let values = values.map(|(k, deviation)| {
+                let value = mean[at + k] * deviation;
+                if own.positive[k] {
+                    value.max(0.0)
+                } else {
+                    value
+                }
+            });
+            let values: Vec<f64> = values.collect();
+            at += own.deviations.len();
+            values
+        };
+        set.iter().map(of).collect()
+    }
+
+    /// Whether a variant may join a set.
+    fn fits(&self, set: &Set, variant: usize) -> bool {
+        let own = &self.variants[variant];
+        let alike = set
+            .iter()
+            .filter(|&&v| own.excludes(&self.variants[v]))
+            .count();
+        let most = own.hypothesis.effect.traits.most_at_one_place;
+        alike < most && !set.contains(&variant)
+    }
+
+    /// The variants whose columns resemble those of a variant: what may take its place.
+    pub fn related(&self, variant: usize) -> &[usize] {
+        self.related[variant].get_or_init(|| {
+            let of = |v: usize| {
+                let own = &self.variants[v];
+                let offset = usize::from(own.offset.is_some());
+                own.first - offset..own.first + own.deviations.len()
+            };
+            let square = |c: usize| self.squares[c].max(1e-300);
+            (0..self.variants.len())
+                .filter(|&w| {
+                    w != variant
+                        && of(variant).any(|a| {
+                            let row = self.gram(a);
+                            of(w)
+                                .any(|b| row[b].powi(2) > RELATED * RELATED * square(a) * square(b))
+                        })
+                })
+                .collect()
+        })
+    }
+
+    /// How much each variant would add to the value of a set; minus infinity where it cannot join.
+    pub fn additions(&self, set: &Set) -> Vec<f64> {
+        let variants: Vec<usize> = (0..self.variants.len()).collect();
+        let gains = self.additions_of(set, &variants);
+        gains.into_iter().map(|(_, gain)| gain).collect()
+    }
+
+    /// The same for some variants.
+    pub fn additions_of(&self, set: &Set, variants: &[usize]) -> Vec<(usize, f64)> {
+        let Some(base) = self.base(set) else {
+            return variants.iter().map(|&v| (v, f64::NEG_INFINITY)).collect();
+        };
+        let p = base.index.len();
+        let rows: Vec<&[f64]> = base.index.iter().map(|&i| self.gram(i)).collect();
+        let offset_rows: Vec<&[f64]> = base.offsets.iter().map(|&o| self.gram(o)).collect();
+        let one = |&v: &usize| {
+            if !self.fits(set, v) {
+                return f64::NEG_INFINITY;
+            }
+            let variant = &self.variants[v];
+            let offset = usize::from(variant.offset.is_some());
+            let columns = variant.first - offset..variant.first + variant.deviations.len();
+            let m = columns.len();
+            let mut cross = DMatrix::from_fn(p, m, |a, c| rows[a][columns.start + c]);
+            base.lower.solve_lower_triangular_mut(&mut cross);
+            let own = &self.own[v] - cross.tr_mul(&cross);
+            let mut right = DVector::from_fn(m, |c, _| {
+                let at = columns.start + c;
+                self.columns[at].right - offset_rows.iter().map(|row| row[at]).sum::<f64>()
+            });
+            right -= cross.tr_mul(&base.solved);
+            let mut gain = variant.log_prior;
+            if offset == 1 {
+                gain += right[0] - 0.5 * own[(0, 0)];
+                let shift = own.column(0).into_owned();
+                right -= shift;
+            }
+            let q = m - offset;
+            if q == 0 {
+                return gain;
+            }
+            let mut normal = own.view((offset, offset), (q, q)).into_owned();
+            for i in 0..q {
+                normal[(i, i)] += 1.0;
+            }
+            let Some(factor) = normal.cholesky() else {
+                return f64::NEG_INFINITY;
+            };
+            let right = right.rows(offset, q).into_owned();
+            let mean = factor.solve(&right);
+            gain += 0.5 * right.dot(&mean);
+            let lower = factor.l_dirty();
+            gain -= lower.diagonal().iter().map(|d| d.ln()).sum::<f64>();
+            if variant.positive.contains(&true) {
+                let inverse = factor.inverse();
+                for (k, positive) in variant.positive.iter().enumerate() {
+                    if *positive {
+                        gain += log_twice_share_above_zero(mean[k] / inverse[(k, k)].sqrt());
+                    }
+                }
+            }
+            gain
+        };
+        variants.iter().map(|v| (*v, one(v))).collect()
+    }
+}
+
+/// Posterior means of the scaled coefficients, and the inverse of the factor whose rows' norms are their deviations.
+fn mean_and_inverse(base: &Base) -> (DVector<f64>, DMatrix<f64>) {
+    let p = base.index.len();
+    let mut inverse = DMatrix::identity(p, p);
+    base.lower.solve_lower_triangular_mut(&mut inverse);
+    let inverse = inverse.transpose();
+    (&inverse * &base.solved, inverse)
+}
+
+/// ln(2 Φ(z)) with the normal distribution function Φ.
+fn log_twice_share_above_zero(z: f64) -> f64 {
+    if z > 6.0 {
+        return std::f64::consts::LN_2;
+    }
+    if z < -6.0 {
+        // Mills' ratio: Φ(z) is about φ(z) / |z|.
+        return -0.5 * z * z - (z.abs() * (std::f64::consts::TAU).sqrt()).ln()
+            + std::f64::consts::LN_2;
+    }
+    (2.0 * share_below(z)).ln()
+}
+
+/// The normal distribution function (Abramowitz and Stegun, equation 26.2.17; absolute error below 7.5e-8).
+fn share_below(z: f64) -> f64 {
+    let x = z.abs();
+    let t = 1.0 / (1.0 + 0.231_641_9 * x);
+    let series = t
+        * (0.319_381_530
+            + t * (-0.356_563_782
+                + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
+    let tail = (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt() * series;
+    if z > 0.0 { 1.0 - tail } else { tail.max(1e-12) }
+}

@@ -1,0 +1,245 @@
+//! The search: a beam over sets of effects with generic moves.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tauscope_dynamics::terms::PlaceKind;
+
+use crate::physics::active::Hypothesis;
+use crate::select::parallel;
+
+use super::objective::{Objective, Set};
+
+/// Sets that are kept from one step to the next. Chosen: more find nothing else in the development cases.
+const BEAM: usize = 3;
+/// Best additions that are tried of each set. Resolution: changes the computing time.
+const ADDED: usize = 6;
+/// Best replacements that are tried for each effect. Resolution: changes the computing time.
+const REPLACED: usize = 3;
+/// Most steps. Resolution: bounds the computing time; a step that gains nothing is the last.
+const STEPS: usize = 30;
+/// A step that gains less is the last \[nats\]. Resolution: of the objective's rounding.
+const LEAST_GAIN: f64 = 1e-6;
+
+/// The best set that is found from `start`.
+pub fn search(objective: &Objective<'_>, start: Set) -> Set {
+    // Effects that all joints feel are tried before those of one joint, which together can imitate them, and after.
+    let common = |v: &usize| {
+        let hypothesis = objective.variants[*v].hypothesis;
+        hypothesis.only_joint().is_none() || hypothesis.is_ordinary()
+    };
+    let first: Vec<usize> = (0..objective.variants.len()).filter(common).collect();
+    let all: Vec<usize> = (0..objective.variants.len()).collect();
+    let coarse = warm(objective, warm(objective, start.clone(), &first), &all);
+    let fine = warm(objective, start, &all);
+    let mut best = if objective.score(&coarse) > objective.score(&fine) {
+        coarse
+    } else {
+        fine
+    };
+    let mut beam = vec![best.clone()];
+    let mut done = BTreeSet::new();
+    for _ in 0..STEPS {
+        let mut next: BTreeMap<Set, f64> = BTreeMap::new();
+        for set in &beam {
+            if done.insert(set.clone()) {
+                neighbours(objective, set, &mut next);
+            }
+        }
+        let mut ranked: Vec<(Set, f64)> = next
+            .into_iter()
+            .filter(|(set, _)| !done.contains(set))
+            .collect();
+        ranked.sort_by(|a, b| b.1.total_cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+        ranked.truncate(2 * BEAM);
+        // First-order values of sets are exact but for the signs of the others' factors.
+        let mut exact: Vec<(f64, Set)> = ranked
+            .into_iter()
+            .map(|(set, _)| (objective.score(&set), set))
+            .collect();
+        exact.sort_by(|a, b| b.0.total_cmp(&a.0));
+        exact.truncate(BEAM);
+        let Some((score, set)) = exact.first() else {
+            break;
+        };
+        if *score <= objective.score(&best) + LEAST_GAIN {
+            break;
+        }
+        best.clone_from(set);
+        beam = exact.into_iter().map(|(_, set)| set).collect();
+    }
+    best
+}
+
+/// The place of an effect: what is added at the same time in a warm start acts at different ones.
+fn place(hypothesis: Hypothesis) -> (bool, usize) {
+    let at_joint = matches!(
+        hypothesis.effect.place,
+        PlaceKind::Joint | PlaceKind::TwoJoints
+    );
+    let whole = if at_joint {
+        hypothesis.place.joint
+    } else {
+        hypothesis.place.link
+    };
+    (at_joint, whole)
+}
+
+fn with(set: &Set, variant: usize) -> Set {
+    let mut set = set.clone();
+    if let Err(at) = set.binary_search(&variant) {
+        set.insert(at, variant);
+    }
+    set
+}
+
+fn without(set: &Set, variant: usize) -> Set {
+    set.iter().copied().filter(|v| *v != variant).collect()
+}
+
+fn ranked(gains: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..gains.len()).filter(|&v| gains[v].is_finite()).collect();
+    order.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]).then(a.cmp(&b)));
+    order
+}
+
+/// The best addition of every place at once, as long as that gains; then what the newcomers made idle leaves.
+fn warm(objective: &Objective<'_>, start: Set, allowed: &[usize]) -> Set {
+    let mut best = start;
+    loop {
+        let mut gains = vec![f64::NEG_INFINITY; objective.variants.len()];
+        for (v, gain) in objective.additions_of(&best, allowed) {
+            gains[v] = gain;
+        }
+        let mut picked: BTreeMap<(bool, usize), usize> = BTreeMap::new();
+        let order = ranked(&gains);
+        for &v in order.iter().take_while(|&&v| gains[v] > 0.0) {
+            picked
+                .entry(place(objective.variants[v].hypothesis))
+                .or_insert(v);
+        }
+        let Some(&first) = order.first().filter(|&&v| gains[v] > 0.0) else {
+            return best;
+        };
+        let one = with(&best, first);
+        let all = picked.values().fold(best.clone(), |set, &v| with(&set, v));
+        let before = objective.score(&best);
+        best = if objective.score(&all) > objective.score(&one) {
+            all
+        } else {
+            one
+        };
+        best = without_idle(objective, best);
+        if objective.score(&best) <= before + LEAST_GAIN {
+            return best;
+        }
+    }
+}
+
+/// The set without the effects that it is no worse without, the idlest first.
+pub fn without_idle(objective: &Objective<'_>, mut best: Set) -> Set {
+    loop {
+        let free = best
+            .iter()
+            .copied()
+            .filter(|&v| !objective.variants[v].is_forced);
+        let less = free.map(|v| without(&best, v));
+        let less = less.max_by(|a, b| objective.score(a).total_cmp(&objective.score(b)));
+        match less {
+            Some(less) if objective.score(&less) >= objective.score(&best) => best = less,
+            _ => return best,
+        }
+    }
+}
+
+/// The sets that one move makes of a set, with their first-order values.
+fn neighbours(objective: &Objective<'_>, set: &Set, next: &mut BTreeMap<Set, f64>) {
+    let own = objective.score(set);
+    let mut offers: Vec<(Set, f64)> = Vec::new();
+    let gains = objective.additions(set);
+    for v in ranked(&gains).into_iter().take(ADDED) {
+        offers.push((with(set, v), own + gains[v]));
+    }
+    let free: Vec<usize> = set
+        .iter()
+        .copied()
+        .filter(|&v| !objective.variants[v].is_forced)
+        .collect();
+    let of = |&v: &usize| replacements(objective, set, v);
+    offers.extend(parallel::map(&free, of).into_iter().flatten());
+    // All effects of one joint but the ordinary ones, in exchange for one or two.
+    let mut joints: Vec<Option<usize>> = free
+        .iter()
+        .map(|&v| objective.variants[v].hypothesis.only_joint())
+        .collect();
+    joints.sort_unstable();
+    joints.dedup();
+    let collapse = |joint: &Option<usize>| -> Vec<(Set, f64)> {
+        let own = |v: &usize| {
+            let hypothesis = objective.variants[*v].hypothesis;
+            hypothesis.only_joint() == *joint
+                && !hypothesis.is_ordinary()
+                && !objective.variants[*v].is_forced
+        };
+        if free.iter().filter(|v| own(v)).count() < 3 {
+            return Vec::new();
+        }
+        let mut less: Set = set.iter().copied().filter(|v| !own(v)).collect();
+        let at_joint: Vec<usize> = (0..objective.variants.len())
+            .filter(|&v| objective.variants[v].hypothesis.only_joint() == *joint)
+            .collect();
+        let mut offers = Vec::new();
+        for _ in 0..2 {
+            let gains = objective.additions_of(&less, &at_joint);
+            let Some((best, _)) = gains.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) else {
+                break;
+            };
+            less = with(&less, best);
+            offers.push((less.clone(), objective.score(&less)));
+        }
+        offers
+    };
+    offers.extend(parallel::map(&joints, collapse).into_iter().flatten());
+    let pairs: Vec<(usize, usize)> = free
+        .iter()
+        .enumerate()
+        .flat_map(|(i, &v)| free[i + 1..].iter().map(move |&w| (v, w)))
+        .filter(|&(v, w)| objective.related(v).contains(&w))
+        .collect();
+    let merge = |&(v, w): &(usize, usize)| {
+        let less = without(&without(set, v), w);
+        let score = objective.score(&less);
+        let gains = objective.additions_of(&less, objective.related(v));
+        let best = gains
+            .into_iter()
+            .filter(|(x, _)| *x != w)
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        best.map(|(x, gain)| (with(&less, x), score + gain))
+    };
+    offers.extend(parallel::map(&pairs, merge).into_iter().flatten());
+    for (set, value) in offers {
+        let known = next.entry(set).or_insert(f64::NEG_INFINITY);
+        *known = known.max(value);
+    }
+}
+
+/// What removes an effect of a set, replaces it, or splits it into two.
+fn replacements(objective: &Objective<'_>, set: &Set, v: usize) -> Vec<(Set, f64)> {
+    let less = without(set, v);
+    let score = objective.score(&less);
+    let mut offers = vec![(less.clone(), score)];
+    let mut gains = objective.additions_of(&less, objective.related(v));
+    gains.retain(|(_, gain)| gain.is_finite());
+    gains.sort_by(|a, b| b.1.total_cmp(&a.1));
+    for &(w, gain) in gains.iter().take(REPLACED) {
+        offers.push((with(&less, w), score + gain));
+    }
+    if let Some(&(w, gain)) = gains.first().filter(|(_, gain)| *gain > 0.0) {
+        let half = with(&less, w);
+        let more = objective.additions_of(&half, objective.related(v));
+        let second = more.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((x, more)) = second.filter(|(_, more)| more.is_finite()) {
+            offers.push((with(&half, x), score + gain + more));
+        }
+    }
+    offers
+}

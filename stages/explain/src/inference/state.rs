@@ -1,0 +1,210 @@
+//! What is estimated along with an explanation: noise, heavy tails, and how far bodies and laws are off.
+
+use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::terms::sign;
+
+use crate::data::column::Column;
+use crate::data::problem::Problem;
+use crate::fit::fitted::Fit;
+use crate::fit::least_squares::solved;
+
+use super::noise::{self, Noise, Whitener};
+use super::nuisance::{self, Nuisance, Size};
+use super::objective::{Objective, Set};
+use super::rows::Rows;
+use super::space::Space;
+use super::variants::{self, Given, Variant};
+
+/// How far bodies may be off, in usual errors. Resolution: of an estimate that some ten bodies allow, and that the heavy ones
+/// decide: light ones may be off by more.
+const BODY_SCALES: [f64; 3] = [0.55, 1.0, 1.8];
+/// How far laws may be off, in usual errors. Resolution: as of bodies.
+const LAW_SCALES: [f64; 4] = [0.1, 0.3, 0.55, 1.0];
+/// Weight of the usual errors against an estimate: twice the squared logarithm of the scale is taken off \[nats\].
+/// Chosen: a normal prior on the logarithm with a standard deviation of one half.
+const SCALE_WEIGHT: f64 = 2.0;
+/// Innovations beyond so many standard deviations weigh as if they were there. Statistical: one in 370 of a normal variable.
+const TAIL: f64 = 3.0;
+/// Fewer rows say nothing of a joint's noise. Resolution: of three numbers.
+const LEAST_ROWS: usize = 20;
+
+/// What is estimated along with an explanation.
+pub struct State<'a> {
+    problem: &'a Problem,
+    bodies: bool,
+    rows: Vec<Rows>,
+    /// Root mean square of each joint's measured effort \[N m or N\].
+    pub efforts: Vec<f64>,
+    noises: Vec<Noise>,
+    /// Additional variance of each joint's rows: heavy tails.
+    extra: Vec<Vec<f64>>,
+    /// How far bodies and laws are off, in usual errors.
+    pub scales: [f64; 2],
+}
+
+impl<'a> State<'a> {
+    pub fn new(problem: &'a Problem, bodies: bool) -> Self {
+        let rows: Vec<Rows> = (0..problem.joints).map(|j| Rows::of(problem, j)).collect();
+        let rms = |(joint, rows): (usize, &Rows)| {
+            let values = rows.pick(&problem.measured[problem.joint_rows(joint)]);
+            let squares: f64 = values.iter().map(|x| x * x).sum();
+            (squares / values.len().max(1) as f64).sqrt().max(1e-9)
+        };
+        let efforts: Vec<f64> = rows.iter().enumerate().map(rms).collect();
+        Self {
+            problem,
+            bodies,
+            noises: efforts.iter().map(|rms| Noise::start(*rms)).collect(),
+            extra: rows.iter().map(|rows| vec![0.0; rows.len()]).collect(),
+            scales: [1.0, 1.0],
+            rows,
+            efforts,
+        }
+    }
+
+    pub fn space(&self, nuisances: &[Nuisance]) -> Space {
+        let of = |joint: usize| {
+            Whitener::new(&self.rows[joint], &self.noises[joint], &self.extra[joint])
+        };
+        let filters = (0..self.problem.joints).map(of).collect();
+        let columns: Vec<&Column> = nuisances.iter().map(|n| &n.column).collect();
+        Space::new(self.problem, self.rows.clone(), filters, &columns)
+    }
+
+    /// Estimates the noise of each joint next to the nuisances and the effects of `fit`; at first, next to every effect that is
+    /// linear in its numbers, with slow noise no larger than the white noise, so that it cannot hide what is searched for.
+    pub fn estimate_noise(
+        &mut self,
+        fit: &Fit,
+        nuisances: &[Nuisance],
+        given: &[Given],
+        measured: &Column,
+        is_first: bool,
+    ) {
+        let problem = self.problem;
+        for joint in 0..problem.joints {
+            let rows = &self.rows[joint];
+            if rows.len() < LEAST_ROWS {
+                continue;
+            }
+            let own = |column: &Column| column.of_joint(joint, problem.rows).map(|x| rows.pick(x));
+            let mut columns: Vec<Vec<f64>> =
+                nuisances.iter().filter_map(|n| own(&n.column)).collect();
+            let counts = |variant: &Variant| {
+                let is_linear = variant.hypothesis.is_linear() && variant.curve.is_none();
+                is_first && is_linear
+                    || fit
+                        .actives
+                        .iter()
+                        .any(|active| active.hypothesis == variant.hypothesis)
+            };
+            for given in given.iter().filter(|given| counts(&given.variant)) {
+                for (column, deviation) in given.factors.iter().zip(&given.variant.deviations) {
+                    let scaled = own(column).map(|x| x.iter().map(|x| x * deviation).collect());
+                    columns.extend(scaled);
+                }
+            }
+            let matrix = DMatrix::from_fn(rows.len(), columns.len(), |k, c| columns[c][k]);
+            let white = problem.white_noise[joint];
+            let most_slow = if is_first { white } else { f64::INFINITY };
+            if let Some(y) = own(measured) {
+                let data = noise::Data {
+                    rows,
+                    y: &y,
+                    columns: &matrix,
+                    extra: &self.extra[joint],
+                };
+                let bounds = (white, most_slow);
+                self.noises[joint] =
+                    noise::estimate(&data, self.efforts[joint], self.noises[joint], bounds);
+            }
+        }
+    }
+
+    /// Estimates how far bodies and laws are off (empirical Bayes), next to the effects of a fit.
+    pub fn estimate_scales(&mut self, fit: &Fit, sizes: &[Size]) {
+        let problem = self.problem;
+        let measured = variants::measured(problem, fit);
+        let value = |state: &Self, scales: [f64; 2]| {
+            let nuisances = nuisance::of(problem, fit, sizes, state.bodies, scales);
+            let space = state.space(&nuisances);
+            let given = variants::of_fit(problem, fit, &state.efforts);
+            let own = Objective::new(&space, &measured, given);
+            let all: Set = (0..own.variants.len()).collect();
+            let prior: f64 = scales.iter().map(|s| SCALE_WEIGHT * s.ln().powi(2)).sum();
+            space.evidence(&measured) + own.score(&all) - prior
+        };
+        for which in (0..2).filter(|which| *which == 1 || self.bodies) {
+            let with = |scale: f64| {
+                let mut scales = self.scales;
+                scales[which] = scale;
+                scales
+            };
+            let scales: &[f64] = if which == 0 {
+                &BODY_SCALES
+            } else {
+                &LAW_SCALES
+            };
+            let all = scales
+                .iter()
+                .map(|scale| (value(self, with(*scale)), with(*scale)));
+            let best = all.max_by(|a, b| a.0.total_cmp(&b.0));
+            self.scales = best.map_or(self.scales, |(_, scales)| scales);
+        }
+    }
+
+    /// Gives rows far outside the noise the variance with which they are at its tail.
+    pub fn mark_tail(&mut self, space: &Space, fit: &Fit) {
+        let residual = Column {
+            joint: None,
+            values: fit.residual.clone(),
+        };
+        let all = space.innovations(&residual).into_iter().enumerate();
+        for (joint, innovations) in all {
+            let white = self.noises[joint].white.powi(2);
+            for (extra, z) in self.extra[joint].iter_mut().zip(innovations) {
+                *extra += (white + *extra) * ((z / TAIL).powi(2) - 1.0).max(0.0);
+            }
+        }
+    }
+
+    /// The magnitudes that nuisances are shares of.
+    pub fn sizes(&self, fit: &Fit) -> Vec<Size> {
+        let of = |joint: usize| Size {
+            effort: self.efforts[joint],
+            friction: friction_rms(self.problem, fit, &self.rows[joint], joint),
+        };
+        (0..self.problem.joints).map(of).collect()
+    }
+}
+
+/// Root mean square of the friction in a rough fit of one joint: Coulomb and viscous friction, inertia, load and an offset by
+/// least squares.
+fn friction_rms(problem: &Problem, fit: &Fit, rows: &Rows, joint: usize) -> f64 {
+    let count = rows.len();
+    if count < LEAST_ROWS {
+        return 0.0;
+    }
+    let n = problem.joints;
+    let track = |r: usize| &problem.tracks[r].track;
+    let load = fit.load(problem);
+    let speed = |r: usize, k: usize| track(r).velocity[k * n + joint];
+    let columns = [
+        nuisance::column_of(problem, joint, |r, k| sign(speed(r, k))),
+        nuisance::column_of(problem, joint, speed),
+        nuisance::column_of(problem, joint, |r, k| track(r).acceleration[k * n + joint]),
+        nuisance::column_of(problem, joint, |r, k| load[r][k * n + joint]),
+    ]
+    .map(|column| rows.pick(&column.values));
+    let matrix = DMatrix::from_fn(count, 5, |k, c| {
+        columns.get(c).map_or(1.0, |column| column[k])
+    });
+    let measured = variants::measured(problem, fit);
+    let y = DVector::from_vec(rows.pick(&measured.values[problem.joint_rows(joint)]));
+    let normal = matrix.tr_mul(&matrix);
+    let Some(x) = solved(&normal, &matrix.tr_mul(&y), &[true; 5], 1e-6) else {
+        return 0.0;
+    };
+    let friction = (0..count).map(|k| (x[0] * columns[0][k] + x[1] * columns[1][k]).powi(2));
+    (friction.sum::<f64>() / count as f64).sqrt()
+}

@@ -1,0 +1,358 @@
+//! The hypotheses at the shapes that are tried, with their columns next to an explanation.
+
+use std::sync::Arc;
+
+use tauscope_dynamics::terms::{CoordinateKind, Table, UNKNOWN};
+
+use crate::data::column::Column;
+use crate::data::problem::Problem;
+use crate::fit::fitted::Fit;
+use crate::physics::active::{Active, Hypothesis, TimeKind, Whereabouts, held_knots};
+use crate::physics::friction::least;
+use crate::select::curve_axes::curves;
+use crate::select::curve_shapes::knot_columns;
+use crate::select::grid::shapes;
+use crate::select::parallel;
+use crate::select::propose::Base;
+
+use super::prior;
+
+/// Most knots of a curve. Resolution: more cost time and describe nothing that fewer do not.
+const MOST_KNOTS: usize = 16;
+/// Usual number of times at which a change may happen. Resolution: that of the scan over a recording.
+const TIMES: f64 = 60.0;
+
+/// A hypothesis at one shape.
+#[derive(Debug)]
+pub struct Variant {
+    /// The effect and its place.
+    pub hypothesis: Hypothesis,
+    /// Its coordinates with the factors at zero.
+    pub shape: Vec<f64>,
+    /// Index of the column that its shape alone adds, if any.
+    pub offset: Option<usize>,
+    /// Index of the first of its factors' columns.
+    pub first: usize,
+    /// Standard deviations of the factors.
+    pub deviations: Vec<f64>,
+    /// By factor, whether it cannot be negative.
+    pub positive: Vec<bool>,
+    /// Logarithm of the prior \[nats\].
+    pub log_prior: f64,
+    /// Whether every explanation has it.
+    pub is_forced: bool,
+    /// The curve of an `unknown`.
+    pub curve: Option<Table>,
+}
+
+impl Variant {
+    /// The effect with these factors.
+    pub fn with(&self, factors: &[f64]) -> Active {
+        if let Some(curve) = &self.curve {
+            return Active {
+                hypothesis: self.hypothesis,
+                coordinates: factors.to_vec(),
+                curve: Some(curve.clone()),
+            };
+        }
+        let mut coordinates = self.shape.clone();
+        for (&i, value) in self.hypothesis.factors().iter().zip(factors) {
+            coordinates[i] = *value;
+        }
+        self.hypothesis.with(coordinates)
+    }
+
+    /// The factors of an effect of this kind.
+    pub fn factors_of(&self, active: &Active) -> Vec<f64> {
+        if self.curve.is_some() {
+            return active.coordinates.clone();
+        }
+        let factors = self.hypothesis.factors().into_iter();
+        factors.map(|i| active.coordinates[i]).collect()
+    }
+
+    /// Prior standard deviations of all coordinates, infinite for shapes and times.
+    pub fn all_deviations(&self) -> Vec<f64> {
+        if self.curve.is_some() {
+            return self.deviations.clone();
+        }
+        let mut all = vec![f64::INFINITY; self.shape.len()];
+        for (&i, deviation) in self.hypothesis.factors().iter().zip(&self.deviations) {
+            all[i] = *deviation;
+        }
+        all
+    }
+
+    /// Whether one explanation cannot have both: laws nest, so a place has one of all laws that contain the same simplest
+    /// one; a joint's effort is late in one way; and a joint has one curve over the same thing.
+    pub fn excludes(&self, other: &Self) -> bool {
+        let (own, others) = (self.hypothesis, other.hypothesis);
+        if own.is_of_timing() && others.is_of_timing() {
+            let (a, b) = (own.only_joint(), others.only_joint());
+            return a.is_none() || b.is_none() || a == b;
+        }
+        let against = |v: &Self| v.curve.as_ref().map(|c| (c.against, c.of_joint));
+        own.place == others.place
+            && simplest(own) == simplest(others)
+            && against(self) == against(other)
+    }
+
+    /// Indices of its factors' columns.
+    pub fn columns(&self) -> std::ops::Range<usize> {
+        self.first..self.first + self.deviations.len()
+    }
+}
+
+/// The columns of a variant, unwhitened.
+pub struct Given {
+    /// The variant; `offset` and `first` are filled in.
+    pub variant: Variant,
+    /// What its shape alone adds.
+    pub alone: Option<Column>,
+    /// What its factors add per unit.
+    pub factors: Vec<Arc<Column>>,
+}
+
+/// The simplest law that an effect contains.
+pub fn simplest(hypothesis: Hypothesis) -> &'static str {
+    let effect = hypothesis.effect;
+    effect
+        .simpler
+        .map_or(effect.name, |simpler| simpler.effect.name)
+}
+
+/// Every hypothesis at every shape of its grid, and at its most promising times; the effects of `fit` come first, as they
+/// are. The columns are tangents at `fit`.
+pub fn all(problem: &Problem, fit: &Fit, hypotheses: &[Hypothesis], sizes: &[f64]) -> Vec<Given> {
+    let mut all = of_fit(problem, fit, sizes);
+    let jobs: Vec<Hypothesis> = hypotheses.to_vec();
+    let timed = Base::new(problem, fit, hypotheses.len());
+    let of = |hypothesis: &Hypothesis| -> Vec<Given> {
+        let at_times = hypothesis.time_kind() != TimeKind::Always || hypothesis.effect.is_surface();
+        let shapes = if at_times {
+            let proposal = timed.propose_in_time(*hypothesis);
+            proposal.map(|p| vec![p.active.shape()]).unwrap_or_default()
+        } else {
+            shapes(problem, *hypothesis)
+        };
+        let count = shapes.len();
+        let given = shapes
+            .into_iter()
+            .map(|shape| at(problem, fit, *hypothesis, shape, count, sizes));
+        given.flatten().collect()
+    };
+    all.extend(parallel::map(&jobs, of).into_iter().flatten());
+    let joints: Vec<usize> = (0..problem.joints).collect();
+    let curves = |&joint: &usize| of_curves(problem, fit, joint, sizes);
+    all.extend(parallel::map(&joints, curves).into_iter().flatten());
+    all
+}
+
+/// Curves of a joint's effort over what may act on it: what is described without a law.
+fn of_curves(problem: &Problem, fit: &Fit, joint: usize, sizes: &[f64]) -> Vec<Given> {
+    let place = Whereabouts {
+        joint,
+        ..Whereabouts::default()
+    };
+    let hypothesis = Hypothesis {
+        effect: &UNKNOWN,
+        place,
+    };
+    let mut tables = curves(problem, joint);
+    tables.retain(|curve| curve.of_joint == joint && curve.knots.len() <= MOST_KNOTS);
+    let count = tables.len();
+    let of = |curve: Table| {
+        let free = curve.knots.len() - held_knots(&curve, joint).len();
+        if free == 0 {
+            return None;
+        }
+        let active = Active {
+            hypothesis,
+            coordinates: vec![0.0; free],
+            curve: Some(curve.clone()),
+        };
+        let columns = knot_columns(problem, fit, &active)
+            .into_iter()
+            .map(Arc::new);
+        let mut given = given(
+            problem,
+            hypothesis,
+            Vec::new(),
+            (None, columns.collect()),
+            count,
+            sizes,
+        )?;
+        // Every value of a curve has the size of the whole.
+        given.variant.deviations = vec![prior::USUAL_SHARE * sizes[joint]; free];
+        given.variant.positive = vec![false; free];
+        given.variant.curve = Some(curve);
+        Some(given)
+    };
+    tables.into_iter().filter_map(of).collect()
+}
+
+/// The effects of a fit as they are.
+pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[f64]) -> Vec<Given> {
+    let jacobian = fit.jacobian(problem);
+    let free = fit.parameters();
+    let of = |(i, active): (usize, &Active)| {
+        let own = free.iter().zip(&jacobian);
+        let own = own.filter(|((of, c), _)| *of == i && fit.is_factor(i, *c));
+        let factors: Vec<(f64, Arc<Column>)> = own
+            .map(|((_, c), column)| (active.coordinates[*c], Arc::clone(column)))
+            .collect();
+        // What the effect adds besides its tangent.
+        let joint = active.hypothesis.only_joint();
+        let mut alone = total(problem, fit, i, joint);
+        for (factor, column) in &factors {
+            for (k, value) in alone.values.iter_mut().enumerate() {
+                let of = match (joint, column.joint) {
+                    (Some(_), Some(_)) | (None, None) => column.values[k],
+                    (Some(own), None) => column.values[own * problem.rows + k],
+                    (None, Some(own)) if k / problem.rows == own => column.values[k % problem.rows],
+                    (None, Some(_)) => 0.0,
+                };
+                *value -= factor * of;
+            }
+        }
+        let largest = alone
+            .values
+            .iter()
+            .fold(0.0_f64, |most, x| most.max(x.abs()));
+        let most_effort = sizes.iter().copied().fold(0.0, f64::max);
+        let alone = (largest > 1e-6 * most_effort).then_some(alone);
+        let factors: Vec<Arc<Column>> = factors.into_iter().map(|(_, column)| column).collect();
+        let mut given = given(
+            problem,
+            active.hypothesis,
+            active.shape(),
+            (alone, factors),
+            1,
+            sizes,
+        )?;
+        if let Some(curve) = &active.curve {
+            let free = active.coordinates.len();
+            given.variant.deviations =
+                vec![prior::USUAL_SHARE * sizes[active.hypothesis.place.joint]; free];
+            given.variant.positive = vec![false; free];
+            given.variant.curve = Some(curve.clone());
+        }
+        Some(given)
+    };
+    fit.actives.iter().enumerate().filter_map(of).collect()
+}
+
+/// What an effect of a fit adds to the explained effort.
+fn total(problem: &Problem, fit: &Fit, index: usize, joint: Option<usize>) -> Column {
+    let less = fit.without(problem, index);
+    let rows = joint.map_or(0..problem.joints * problem.rows, |j| problem.joint_rows(j));
+    let pairs = less.residual[rows.clone()].iter().zip(&fit.residual[rows]);
+    Column {
+        joint,
+        values: pairs.map(|(less, with)| less - with).collect(),
+    }
+}
+
+/// The measured effort, less what the twin without the effects of `fit` explains, as far as that is the sum of the
+/// effects' own efforts.
+pub fn measured(problem: &Problem, fit: &Fit) -> Column {
+    let mut values = fit.residual.clone();
+    for (i, active) in fit.actives.iter().enumerate() {
+        let total = total(problem, fit, i, active.hypothesis.only_joint());
+        let first = total.joint.map_or(0, |joint| joint * problem.rows);
+        for (value, add) in values[first..].iter_mut().zip(&total.values) {
+            *value += add;
+        }
+    }
+    Column {
+        joint: None,
+        values,
+    }
+}
+
+fn at(
+    problem: &Problem,
+    fit: &Fit,
+    hypothesis: Hypothesis,
+    shape: Vec<f64>,
+    count: usize,
+    sizes: &[f64],
+) -> Option<Given> {
+    let columns = fit.columns(problem, hypothesis, &shape);
+    let alone = columns.alone.clone();
+    given(
+        problem,
+        hypothesis,
+        shape,
+        (alone, columns.factors.clone()),
+        count,
+        sizes,
+    )
+}
+
+/// A variant with its columns; `None` if it does nothing.
+fn given(
+    problem: &Problem,
+    hypothesis: Hypothesis,
+    shape: Vec<f64>,
+    (alone, factors): (Option<Column>, Vec<Arc<Column>>),
+    count: usize,
+    sizes: &[f64],
+) -> Option<Given> {
+    let share = |column: &Column| {
+        let of = |joint: usize| {
+            let values = column.of_joint(joint, problem.rows)?;
+            let weight = &problem.weight[problem.joint_rows(joint)];
+            let counted = values.iter().zip(weight).filter(|(_, w)| **w > 0.0);
+            let peak = counted.fold(0.0_f64, |most, (x, _)| most.max(x.abs()));
+            Some(peak / sizes[joint].max(1e-9))
+        };
+        (0..problem.joints).filter_map(of).fold(0.0, f64::max)
+    };
+    let shares: Vec<f64> = factors.iter().map(|column| share(column)).collect();
+    let silent = shares.iter().all(|share| *share <= 1e-9);
+    if silent && alone.as_ref().is_none_or(|alone| share(alone) <= 1e-9) {
+        return None;
+    }
+    let positive = hypothesis
+        .effect
+        .coordinates
+        .iter()
+        .filter_map(|c| match c.kind {
+            CoordinateKind::Factor { minimum, .. } => {
+                Some(least(problem, hypothesis, minimum) >= 0.0)
+            }
+            _ => None,
+        });
+    let times = match hypothesis.time_kind() {
+        TimeKind::Always => 0.0,
+        TimeKind::Step => TIMES.ln(),
+        TimeKind::EveryRecording | TimeKind::Once => 2.0 * TIMES.ln(),
+    };
+    let is_forced = hypothesis.is_torque_scale();
+    let log_prior = if is_forced {
+        0.0
+    } else {
+        hypothesis.effect.odds_nats - (count as f64).ln() - times
+    };
+    Some(Given {
+        variant: Variant {
+            hypothesis,
+            shape,
+            offset: None,
+            first: 0,
+            deviations: prior::deviations(
+                problem,
+                hypothesis,
+                &shares,
+                sizes[hypothesis.place.joint],
+            ),
+            positive: positive.collect(),
+            log_prior,
+            is_forced,
+            curve: None,
+        },
+        alone,
+        factors,
+    })
+}
