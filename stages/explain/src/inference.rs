@@ -36,6 +36,7 @@ use variants::Variant;
 
 /// Most rounds of linearising, estimating the noise and searching. Resolution: bounds the computing time.
 const ROUNDS: usize = 6;
+
 /// An explanation and what is known of it.
 #[derive(Debug)]
 pub struct Inferred {
@@ -155,9 +156,6 @@ fn without_idle(
 ) -> Solution {
     loop {
         let given = variants::of_fit(problem, &solution.fit, &state.efforts);
-        if given.len() < solution.fit.actives.len() {
-            return solution;
-        }
         let own = Objective::new(space, &variants::measured(problem, &solution.fit), given);
         let all: Set = (0..own.variants.len()).collect();
         let kept = search::without_idle(&own, all.clone());

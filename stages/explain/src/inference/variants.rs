@@ -19,6 +19,8 @@ use super::prior;
 
 /// Most knots of a curve. Resolution: more cost time and describe nothing that fewer do not.
 const MOST_KNOTS: usize = 16;
+/// Effort below which a column is silent, as a share of the joint's. Resolution: of the rounding of efforts.
+const SILENT: f64 = 1e-9;
 /// Usual number of times at which a change may happen. Resolution: that of the scan over a recording.
 const TIMES: f64 = 60.0;
 
@@ -107,10 +109,12 @@ impl Variant {
 pub struct Given {
     /// The variant; `offset` and `first` are filled in.
     pub variant: Variant,
-    /// What its shape alone adds.
+    /// Effort of its shape alone.
     pub alone: Option<Column>,
-    /// What its factors add per unit.
+    /// Effort per unit of each factor.
     pub factors: Vec<Arc<Column>>,
+    /// Whether it changes no compared row, so that no search needs it.
+    pub is_silent: bool,
 }
 
 /// The simplest law that an effect contains.
@@ -181,17 +185,17 @@ fn of_curves(problem: &Problem, fit: &Fit, joint: usize, sizes: &[f64]) -> Vec<G
             (None, columns.collect()),
             count,
             sizes,
-        )?;
+        );
         // Every value of a curve has the size of the whole.
         given.variant.deviations = vec![prior::USUAL_SHARE * sizes[joint]; free];
         given.variant.positive = vec![false; free];
         given.variant.curve = Some(curve);
-        Some(given)
+        (!given.is_silent).then_some(given)
     };
     tables.into_iter().filter_map(of).collect()
 }
 
-/// The effects of a fit as they are.
+/// The effects of a fit as they are, one each, in their order.
 pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[f64]) -> Vec<Given> {
     let jacobian = fit.jacobian(problem);
     let free = fit.parameters();
@@ -201,7 +205,7 @@ pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[f64]) -> Vec<Given> {
         let factors: Vec<(f64, Arc<Column>)> = own
             .map(|((_, c), column)| (active.coordinates[*c], Arc::clone(column)))
             .collect();
-        // What the effect adds besides its tangent.
+        // The intercept of the tangent: the effect's effort less that of its factors.
         let joint = active.hypothesis.only_joint();
         let mut alone = total(problem, fit, i, joint);
         for (factor, column) in &factors {
@@ -229,7 +233,7 @@ pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[f64]) -> Vec<Given> {
             (alone, factors),
             1,
             sizes,
-        )?;
+        );
         if let Some(curve) = &active.curve {
             let free = active.coordinates.len();
             given.variant.deviations =
@@ -237,12 +241,12 @@ pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[f64]) -> Vec<Given> {
             given.variant.positive = vec![false; free];
             given.variant.curve = Some(curve.clone());
         }
-        Some(given)
+        given
     };
-    fit.actives.iter().enumerate().filter_map(of).collect()
+    fit.actives.iter().enumerate().map(of).collect()
 }
 
-/// What an effect of a fit adds to the explained effort.
+/// Effort of one effect of a fit.
 fn total(problem: &Problem, fit: &Fit, index: usize, joint: Option<usize>) -> Column {
     let less = fit.without(problem, index);
     let rows = joint.map_or(0..problem.joints * problem.rows, |j| problem.joint_rows(j));
@@ -270,6 +274,7 @@ pub fn measured(problem: &Problem, fit: &Fit) -> Column {
     }
 }
 
+/// A hypothesis at one shape; `None` if it changes no compared row.
 fn at(
     problem: &Problem,
     fit: &Fit,
@@ -280,17 +285,18 @@ fn at(
 ) -> Option<Given> {
     let columns = fit.columns(problem, hypothesis, &shape);
     let alone = columns.alone.clone();
-    given(
+    let given = given(
         problem,
         hypothesis,
         shape,
         (alone, columns.factors.clone()),
         count,
         sizes,
-    )
+    );
+    (!given.is_silent).then_some(given)
 }
 
-/// A variant with its columns; `None` if it does nothing.
+/// A variant with its columns.
 fn given(
     problem: &Problem,
     hypothesis: Hypothesis,
@@ -298,7 +304,7 @@ fn given(
     (alone, factors): (Option<Column>, Vec<Arc<Column>>),
     count: usize,
     sizes: &[f64],
-) -> Option<Given> {
+) -> Given {
     let share = |column: &Column| {
         let of = |joint: usize| {
             let values = column.of_joint(joint, problem.rows)?;
@@ -310,10 +316,8 @@ fn given(
         (0..problem.joints).filter_map(of).fold(0.0, f64::max)
     };
     let shares: Vec<f64> = factors.iter().map(|column| share(column)).collect();
-    let silent = shares.iter().all(|share| *share <= 1e-9);
-    if silent && alone.as_ref().is_none_or(|alone| share(alone) <= 1e-9) {
-        return None;
-    }
+    let of_shape = alone.as_ref().map(share);
+    let is_silent = shares.iter().chain(&of_shape).all(|share| *share <= SILENT);
     let positive = hypothesis
         .effect
         .coordinates
@@ -335,7 +339,7 @@ fn given(
     } else {
         hypothesis.effect.odds_nats - (count as f64).ln() - times
     };
-    Some(Given {
+    Given {
         variant: Variant {
             hypothesis,
             shape,
@@ -354,5 +358,26 @@ fn given(
         },
         alone,
         factors,
-    })
+        is_silent,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{at_joint, problem_with};
+
+    /// Guards the indices of the effects of a fit: a delay that was refined to zero changes no row.
+    #[test]
+    fn an_effect_that_changes_nothing_keeps_its_place() {
+        let problem = problem_with(4, |_, _, _| {});
+        let actives = vec![
+            at_joint("torque_delay", 0).with(vec![0.0]),
+            at_joint("viscous_friction", 1).with(vec![0.5]),
+        ];
+        let fit = Fit::new(&problem, actives);
+        let given = of_fit(&problem, &fit, &[1.0, 1.0]);
+        let silent: Vec<bool> = given.iter().map(|given| given.is_silent).collect();
+        assert_eq!(silent, [true, false]);
+    }
 }
