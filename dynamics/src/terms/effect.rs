@@ -27,7 +27,7 @@ pub struct Effect {
     pub layer: Layer,
     /// Logarithm of the prior odds that it is met at one place of an arm \[nats\]: next to nothing for friction, -3 for what is
     /// met now and then (a payload, a torque constant), -4 for what is met seldom, -5 for what happens once, and -7 for what
-    /// few have met. Chosen: by order of magnitude, from service manuals.
+    /// few have met. Chosen: by order of magnitude; no survey was counted.
     pub odds_nats: f64,
     /// Its parameters as files and reports hold them.
     pub parameters: &'static [Parameter],

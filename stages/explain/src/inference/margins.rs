@@ -1,4 +1,4 @@
-//! How much an explanation needs each of its effects, and what could take its place.
+//! Margin and alternatives of each effect of an explanation.
 
 use crate::physics::active::Hypothesis;
 
@@ -13,7 +13,7 @@ const KEPT: usize = 5;
 pub struct Alternative {
     /// The effect and its place.
     pub hypothesis: Hypothesis,
-    /// How much worse the explanation is with it \[nats\].
+    /// Loss of the explanation with it in the place of the other \[nats\].
     pub behind: f64,
 }
 

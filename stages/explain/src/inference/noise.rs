@@ -22,8 +22,8 @@ pub struct Noise {
 /// Shortest correlation time \[s\]. Derived: about one period of the filter of the comparison, below which slow noise
 /// cannot be distinguished from filtered white noise.
 const LEAST_TIME_S: f64 = 0.15;
-/// Smallest standard deviation of the noise, as a share of the joint's effort. Chosen: the effort of a simulation that
-/// is written in single precision and differentiated numerically is no more accurate.
+/// Smallest standard deviation of the noise, as a share of the joint's effort. Chosen: so that no
+/// joint weighs without bound.
 const LEAST_SHARE: f64 = 5e-4;
 /// Slow noise above this share of the joint's effort is unlikely beforehand. Chosen: with [`SLOW_SPREAD`], so that an
 /// effect that grows over minutes is an effect and not noise.
@@ -133,7 +133,7 @@ pub struct Data<'a> {
     pub rows: &'a Rows,
     /// Measured effort of each row.
     pub y: &'a [f64],
-    /// What may explain it, each column at one prior standard deviation.
+    /// Columns that may explain it, each at one prior standard deviation.
     pub columns: &'a DMatrix<f64>,
     /// Additional variance of each row.
     pub extra: &'a [f64],

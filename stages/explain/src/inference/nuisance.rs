@@ -1,4 +1,4 @@
-//! What every real arm has and no report names: bodies a little off, laws a little wrong, stamps a little off.
+//! Nuisances: errors of bodies, laws and stamps that every real arm has and no report names.
 
 use tauscope_dynamics::Inertia;
 use tauscope_dynamics::terms::{EFFECTS, PlaceKind};
@@ -8,22 +8,24 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{BODY, Hypothesis, Whereabouts};
 
-/// Usual error of a mass in a URDF, as a share. Source: identified against published parameters of common arms.
+/// Usual error of a mass in a URDF, as a share. Chosen: by order of magnitude.
 const MASS_SHARE: f64 = 0.05;
-/// Usual error of a centre of mass \[m\].
+/// Usual error of a centre of mass \[m\]. Chosen: as the mass.
 const CENTRE_M: f64 = 0.005;
-/// Usual error of an inertia about the centre of mass, as a share.
+/// Usual error of an inertia about the centre of mass, as a share. Chosen: as the mass.
 const INERTIA_SHARE: f64 = 0.1;
 /// Usual error of a law that is a function of the joint's position or load, as a share of the joint's effort.
+/// Chosen: an estimate scales it.
 const LAW_SHARE: f64 = 0.02;
-/// Usual error of a law of friction, as a share of the joint's friction.
+/// Usual error of a law of friction, as a share of the joint's friction. Chosen: as the other laws.
 const FRICTION_SHARE: f64 = 0.05;
 /// Usual difference between the stamps of effort and position of one joint, apart from that of all \[s\], at least half a
 /// sample. Chosen: of the order of a controller's cycle.
 const STAMP_S: f64 = 0.001;
-/// The same, of all joints together \[s\]. Chosen: current controllers and filters of drives take some milliseconds.
+/// Usual difference between the stamps of effort and position that all joints share \[s\]. Chosen: current controllers and filters of drives take some milliseconds.
 const COMMON_STAMP_S: f64 = 0.004;
-/// Knots of the curves over position, and over velocity or load for each direction.
+/// Knots of the curves over position, and over velocity or load for each direction. Resolution: enough for the bend of
+/// Stribeck friction and a few waves of position.
 const POSITION_KNOTS: usize = 8;
 const OTHER_KNOTS: usize = 4;
 
@@ -32,11 +34,11 @@ const OTHER_KNOTS: usize = 4;
 pub struct Nuisance {
     /// Its effort as a signal.
     pub column: Column,
-    /// What it is.
+    /// Its kind.
     pub source: Source,
 }
 
-/// What a nuisance is.
+/// Kinds of nuisances.
 #[derive(Debug, Clone, Copy)]
 pub enum Source {
     /// A change of a link's inertial parameters.
@@ -61,7 +63,7 @@ pub struct Size {
     pub friction: f64,
 }
 
-/// The nuisances next to a fit; bodies and laws so many times as far off as usual.
+/// The nuisances next to a fit. `scale` and `laws` multiply the usual errors of bodies and of laws.
 pub fn of(
     problem: &Problem,
     fit: &Fit,
@@ -313,7 +315,7 @@ pub fn curves(problem: &Problem, fit: &Fit, joint: usize) -> Vec<Curve> {
     ]
 }
 
-/// What another bandwidth does to the joint's effort: half the second derivative times the square of a sample. Motion and
+/// Effect of another bandwidth on the joint's effort: half the second derivative times the square of a sample. Motion and
 /// effort pass through different filters before they are recorded.
 fn of_bandwidth(problem: &Problem, fit: &Fit, joint: usize) -> Nuisance {
     let n = problem.joints;

@@ -36,7 +36,7 @@ pub struct Objective<'a> {
     scores: Mutex<HashMap<Set, f64>>,
 }
 
-/// What is known of a set, for trying additions.
+/// Factored normal equations of a set.
 struct Base {
     set: Set,
     lower: DMatrix<f64>,
@@ -232,14 +232,14 @@ impl<'a> Objective<'a> {
         })
     }
 
-    /// How much each variant would add to the value of a set; minus infinity where it cannot join.
+    /// Gain in value by each variant added to a set \[nats\]; minus infinity where it cannot join.
     pub fn additions(&self, set: &Set) -> Vec<f64> {
         let variants: Vec<usize> = (0..self.variants.len()).collect();
         let gains = self.additions_of(set, &variants);
         gains.into_iter().map(|(_, gain)| gain).collect()
     }
 
-    /// The same for some variants.
+    /// Gain in value by some variants added to a set \[nats\], as [`Objective::additions`].
     pub fn additions_of(&self, set: &Set, variants: &[usize]) -> Vec<(usize, f64)> {
         let Some(base) = self.base(set) else {
             return variants.iter().map(|&v| (v, f64::NEG_INFINITY)).collect();

@@ -18,7 +18,7 @@ const CENTRE_M: f64 = 0.05;
 const TILT_RAD: f64 = 0.1;
 /// Usual offset of a joint's zero \[rad\]. Chosen: 1 degree.
 const ZERO_RAD: f64 = 0.02;
-/// Usual deviation of a torque constant, as a share. Chosen: catalogues give 10 %.
+/// Usual deviation of a torque constant, as a share. Chosen: by order of magnitude.
 const GAIN_SHARE: f64 = 0.2;
 
 /// Standard deviations of the factors of a hypothesis, in the order of its factors. `column_peaks` are the largest
@@ -44,8 +44,8 @@ pub fn deviations(
     let family = hypothesis.effect.family;
     let factors = hypothesis.effect.coordinates.iter();
     let factors = factors.filter(|c| matches!(c.kind, CoordinateKind::Factor { .. }));
-    let of = |(coordinate, rms): (&Coordinate, &f64)| {
-        let of_effort = USUAL_SHARE / rms.max(1e-12);
+    let of = |(coordinate, peak): (&Coordinate, &f64)| {
+        let of_effort = USUAL_SHARE / peak.max(1e-12);
         let usual = match words::unit(coordinate.name).map_or("", |(_, unit)| unit) {
             "kg" => mass_kg,
             "kg m" => mass_kg * CARRIED_AT_M,

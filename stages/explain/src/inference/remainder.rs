@@ -1,4 +1,4 @@
-//! What an explanation leaves: does any feature of the motion predict the residual of a recording that it was not fitted on?
+//! Test of the residual: whether a feature of the motion predicts it in a recording that was left out of the fit.
 //!
 //! Each recording is left out in turn, and its whitened residual compared with features of the joint's motion by ridge
 //! regressions that leave it out, too. The same is done with residuals that are turned in time, rolled, and given a random
@@ -18,7 +18,7 @@ const RIDGE: f64 = 20.0;
 
 /// A feature of a joint's motion with the columns that span its functions.
 pub struct Feature {
-    /// What it is, in words.
+    /// Its name in reports.
     pub name: &'static str,
     /// The joint.
     pub joint: usize,

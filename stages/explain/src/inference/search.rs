@@ -9,7 +9,7 @@ use crate::select::parallel;
 
 use super::objective::{Objective, Set};
 
-/// Sets that are kept from one step to the next. Chosen: more find nothing else in the development cases.
+/// Sets that are kept from one step to the next. Chosen: for the computing time.
 const BEAM: usize = 3;
 /// Best additions that are tried of each set. Resolution: changes the computing time.
 const ADDED: usize = 6;
@@ -222,7 +222,7 @@ fn neighbours(objective: &Objective<'_>, set: &Set, next: &mut BTreeMap<Set, f64
     }
 }
 
-/// What removes an effect of a set, replaces it, or splits it into two.
+/// Moves that remove an effect of a set, replace it, or split it into two.
 fn replacements(objective: &Objective<'_>, set: &Set, v: usize) -> Vec<(Set, f64)> {
     let less = without(set, v);
     let score = objective.score(&less);

@@ -1,4 +1,4 @@
-//! What is estimated along with an explanation: noise, heavy tails, and how far bodies and laws are off.
+//! Noise, heavy tails and the scales of nuisances, estimated along with an explanation.
 
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::sign;
@@ -15,20 +15,20 @@ use super::rows::Rows;
 use super::space::Space;
 use super::variants::{self, Given, Variant};
 
-/// How far bodies may be off, in usual errors. Resolution: of an estimate that some ten bodies allow, and that the heavy ones
+/// Candidate scales of the errors of bodies, in usual errors. Resolution: of an estimate that some ten bodies allow, and that the heavy ones
 /// decide: light ones may be off by more.
 const BODY_SCALES: [f64; 3] = [0.55, 1.0, 1.8];
-/// How far laws may be off, in usual errors. Resolution: as of bodies.
+/// Candidate scales of the errors of laws, in usual errors. Resolution: as of bodies.
 const LAW_SCALES: [f64; 4] = [0.1, 0.3, 0.55, 1.0];
 /// Weight of the usual errors against an estimate: twice the squared logarithm of the scale is taken off \[nats\].
 /// Chosen: a normal prior on the logarithm with a standard deviation of one half.
 const SCALE_WEIGHT: f64 = 2.0;
-/// Innovations beyond so many standard deviations weigh as if they were there. Statistical: one in 370 of a normal variable.
+/// Largest weight of an innovation, in standard deviations. Statistical: a normal variable exceeds it once in 370 rows.
 const TAIL: f64 = 3.0;
 /// Fewer rows say nothing of a joint's noise. Resolution: of three numbers.
 const LEAST_ROWS: usize = 20;
 
-/// What is estimated along with an explanation.
+/// Estimates that accompany an explanation.
 pub struct State<'a> {
     problem: &'a Problem,
     bodies: bool,
@@ -38,7 +38,7 @@ pub struct State<'a> {
     noises: Vec<Noise>,
     /// Additional variance of each joint's rows: heavy tails.
     extra: Vec<Vec<f64>>,
-    /// How far bodies and laws are off, in usual errors.
+    /// Scales of the errors of bodies and of laws, in usual errors.
     pub scales: [f64; 2],
 }
 

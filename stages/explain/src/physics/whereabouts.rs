@@ -3,7 +3,7 @@
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::Site;
 
-/// Where an effect acts: indices into the model's joints and links. Indices that its kind of place does not use are 0.
+/// Place of an effect: indices into the model's joints and links. Indices that its kind of place does not use are 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct Whereabouts {
     /// The joint.
@@ -15,7 +15,7 @@ pub struct Whereabouts {
 }
 
 impl Whereabouts {
-    /// The same in a robot.
+    /// Returns the place in a robot.
     pub fn site(self, model: &Model) -> Site<'_> {
         let Self {
             joint,

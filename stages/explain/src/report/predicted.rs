@@ -1,4 +1,4 @@
-//! What remains, where a feature of the motion predicts it in recordings that were left out of the fit.
+//! Remaining residual that a feature of the motion predicts in recordings that were left out of the fit.
 
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::words::number;

@@ -114,7 +114,7 @@ fn ticks(time_s: &[f64]) -> Option<(Vec<i64>, EvenClock)> {
     let mut ticks = vec![0];
     for time in &time_s[1..] {
         let passed = ((time - phase) / step).round();
-        // A stamp late by more than half a step was taken for the next tick: the sample after it is due there.
+        // The stamp before was late by more than half a step, so rounding gave it the tick of this sample.
         if passed < 1.0
             && let [.., before, last] = ticks[..]
             && last - before > 1
