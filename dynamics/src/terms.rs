@@ -55,6 +55,7 @@ mod presliding_hysteresis;
 mod quadratic_drag;
 mod rotor_inertia;
 mod sensor_hysteresis;
+mod slow_clock;
 mod spec;
 mod split_joint;
 mod stribeck_friction;
@@ -142,6 +143,7 @@ pub static EFFECTS: &[&Effect] = &[
     &gain_ripple::EFFECT,
     &late_effort::EFFECT,
     &late_position::EFFECT,
+    &slow_clock::EFFECT,
     &external_push::EFFECT,
     &contact_wall::EFFECT,
     &payload_pickup::EFFECT,
@@ -207,6 +209,26 @@ pub struct MotionSample<'a> {
     /// Effort that the gears transmit, friction left out: the rigid body's with the [`Layer::Body`]
     /// terms \[N m or N\]. For terms of that layer the rigid body's alone.
     pub transmitted: &'a [f64],
+}
+
+impl MotionSample<'_> {
+    /// Share of the sample that comes after a time, 0 to 1: a sample stands for the time from half a step before it to half
+    /// a step behind it. `now_s` is its own time on the clock of `time_s`.
+    #[must_use]
+    pub fn share_after(&self, now_s: f64, time_s: f64) -> f64 {
+        let since_s = now_s - time_s;
+        // Times outside the sample need no division, and may be infinite.
+        if since_s.abs() >= self.dt_s {
+            return f64::from(u8::from(since_s >= 0.0));
+        }
+        (since_s / self.dt_s + 0.5).clamp(0.0, 1.0)
+    }
+
+    /// A number that changes from one value to another at a time of the session \[s\].
+    #[must_use]
+    pub fn stepped(&self, [before, after]: [f64; 2], time_s: f64) -> f64 {
+        before + (after - before) * self.share_after(self.session_s, time_s)
+    }
 }
 
 /// One piece of physics with its numbers, at one place of one robot.

@@ -100,12 +100,13 @@ impl Term for BaseTilt {
     }
 
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
-        if !self.there.covers(at) {
+        let share = self.there.share(at);
+        if share <= 0.0 {
             return;
         }
         let added = gravity_effort(&self.model, &mut self.data, at.position);
         for (effort, added) in effort.iter_mut().zip(added) {
-            *effort += added;
+            *effort += share * added;
         }
     }
 

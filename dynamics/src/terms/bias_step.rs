@@ -49,11 +49,7 @@ pub(super) static EFFECT: Effect = Effect {
     },
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[before, after, time_s], _, at| {
-            if at.session_s < *time_s {
-                *before
-            } else {
-                *after
-            }
+            at.stepped([*before, *after], *time_s)
         })
     },
 };

@@ -8,7 +8,7 @@ const CAPACITY: usize = 1024;
 
 /// Efforts as they were a while ago, straight between samples. Before the first sample that one is held.
 #[derive(Debug)]
-struct DelayLine {
+pub(super) struct DelayLine {
     delay_s: f64,
     joint_count: usize,
     /// Time since the reset \[s\].
@@ -24,7 +24,7 @@ struct DelayLine {
 
 impl DelayLine {
     /// One for efforts of so many joints; a delay below zero is none \[s\].
-    fn new(joint_count: usize, delay_s: f64) -> Self {
+    pub(super) fn new(joint_count: usize, delay_s: f64) -> Self {
         Self {
             delay_s: delay_s.max(0.0),
             joint_count,
@@ -36,15 +36,20 @@ impl DelayLine {
         }
     }
 
+    /// Changes the delay \[s\]; a delay below zero is none.
+    pub(super) fn set_delay(&mut self, delay_s: f64) {
+        self.delay_s = delay_s.max(0.0);
+    }
+
     /// Forgets what came before.
-    fn reset(&mut self) {
+    pub(super) fn reset(&mut self) {
         self.now_s = 0.0;
         self.stored = 0;
         self.oldest = 0;
     }
 
     /// Takes the efforts of the next instant, and puts those in their place that were so long ago.
-    fn pass(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+    pub(super) fn pass(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         self.now_s += at.dt_s.max(0.0);
         self.store(effort);
         let wanted_s = self.now_s - self.delay_s;

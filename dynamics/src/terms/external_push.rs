@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::ghost::While;
 use super::law::array;
 use super::{
     Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
@@ -99,11 +100,12 @@ impl Term for ExternalPush {
 
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         let [x, y, z, start, end] = self.values;
-        if !(start <= at.session_s && at.session_s < end) {
-            return;
+        let share = While::InSession([start, end]).share(at);
+        if share > 0.0 {
+            self.at_link.place(at.position);
+            self.at_link
+                .resist(&(Vector3::new(x, y, z) * share), effort);
         }
-        self.at_link.place(at.position);
-        self.at_link.resist(&Vector3::new(x, y, z), effort);
     }
 }
 

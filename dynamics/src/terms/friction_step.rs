@@ -69,11 +69,7 @@ pub(super) static EFFECT: Effect = Effect {
     },
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[before, after, time_s], j, at| {
-            let coulomb = if at.session_s < *time_s {
-                before
-            } else {
-                after
-            };
+            let coulomb = at.stepped([*before, *after], *time_s);
             coulomb * sign(at.velocity[j])
         })
     },

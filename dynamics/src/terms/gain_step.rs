@@ -79,7 +79,7 @@ impl Term for GainStep {
 
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         let [before, after, time_s] = self.values;
-        effort[self.joint] *= 1.0 + if at.session_s < time_s { before } else { after };
+        effort[self.joint] *= 1.0 + at.stepped([before, after], time_s);
     }
 }
 

@@ -15,14 +15,14 @@ pub(super) enum While {
 }
 
 impl While {
-    /// Whether it is there now.
-    pub fn covers(self, at: &MotionSample<'_>) -> bool {
-        let (now_s, [start, end]) = match self {
-            Self::Always => return true,
+    /// Share of a sample in which it is there, 0 to 1.
+    pub fn share(self, at: &MotionSample<'_>) -> f64 {
+        let (now_s, [start_s, end_s]) = match self {
+            Self::Always => return 1.0,
             Self::InEachRecording(window_s) => (at.recording_s, window_s),
             Self::InSession(window_s) => (at.session_s, window_s),
         };
-        start <= now_s && now_s < end
+        (at.share_after(now_s, start_s) - at.share_after(now_s, end_s)).max(0.0)
     }
 }
 
@@ -70,7 +70,8 @@ impl Term for Ghost {
     }
 
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
-        if !self.there.covers(at) {
+        let share = self.there.share(at);
+        if share <= 0.0 {
             return;
         }
         let added = rnea(
@@ -81,7 +82,7 @@ impl Term for Ghost {
             at.acceleration,
         );
         for (effort, added) in effort.iter_mut().zip(added) {
-            *effort += added;
+            *effort += share * added;
         }
     }
 
@@ -98,6 +99,8 @@ impl Term for Ghost {
     }
 
     fn inertia_at(&self, at: &MotionSample<'_>) -> Option<(usize, Inertia)> {
-        self.there.covers(at).then_some((self.link, self.inertia))
+        let share = self.there.share(at);
+        let ten = self.inertia.parameters().map(|x| share * x);
+        (share > 0.0).then(|| (self.link, Inertia::from_parameters(ten)))
     }
 }

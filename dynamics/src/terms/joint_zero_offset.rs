@@ -107,16 +107,13 @@ impl Term for JointZeroOffset {
     }
 
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
-        if self.coordinates[0] == 0.0 || !self.there.covers(at) {
+        let offset = self.coordinates[0] * self.there.share(at);
+        if offset == 0.0 {
             self.robot.skip();
             return;
         }
         let j = self.joint;
-        let truly = [
-            at.position[j] + self.coordinates[0],
-            at.velocity[j],
-            at.acceleration[j],
-        ];
+        let truly = [at.position[j] + offset, at.velocity[j], at.acceleration[j]];
         self.robot.act(at, truly, effort);
     }
 

@@ -57,11 +57,7 @@ pub(super) static EFFECT: Effect = Effect {
     },
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[before, after, time_s], j, at| {
-            let viscous = if at.session_s < *time_s {
-                before
-            } else {
-                after
-            };
+            let viscous = at.stepped([*before, *after], *time_s);
             viscous * at.velocity[j]
         })
     },
