@@ -181,8 +181,8 @@ impl fmt::Display for ScaleFault {
             Self::WrongUnit { slope } => {
                 write!(
                     f,
-                    "the measured effort is {slope:.2} times what this robot's motion requires: the unit or the torque \
-                     constants are wrong"
+                    "the measured effort is {slope:.2} times what this robot's motion requires: the unit, the torque \
+                     constants or the masses of the robot file are wrong"
                 )?;
                 if *slope < 1.0 {
                     write!(

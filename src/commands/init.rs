@@ -53,6 +53,9 @@ pub struct Args {
     /// Topic of the measured joint states; without it the one that names most of the robot's joints.
     #[arg(long, value_name = "TOPIC")]
     state_topic: Option<String>,
+    /// An effect, or a fault of recordings such as `effort_unit`, that is not considered; may be given several times.
+    #[arg(long, value_name = "EFFECT")]
+    without: Vec<String>,
     #[command(flatten)]
     force: Force,
     #[command(flatten)]
@@ -85,6 +88,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         recordings: &recordings,
         state_topic: args.state_topic.as_deref(),
         effort_unit: args.effort_unit,
+        without: &explain::without(&args.without)?,
     };
     let looked = told.look(&|share, what| progress.doing(LOOKED * share, what))?;
     let sentences = [looked.of_robot.clone(), looked.of_recordings.clone()].concat();
@@ -103,6 +107,24 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
             Err(failure)
         }
     }
+}
+
+/// The faults of recordings that had to be mended, so that no twin fits them as they are.
+fn mended(report: &Report) -> Problem {
+    let (mut faults, mut kinds) = (Vec::new(), Vec::new());
+    for finding in report.mended() {
+        faults.push(&*finding.sentence);
+        kinds.push(format!("--without {}", finding.known_as()));
+    }
+    kinds.dedup();
+    let problem = Problem::new(format!(
+        "the recordings do not match the robot. {}",
+        faults.join(" ")
+    ));
+    problem.help(format!(
+        "mend this, or leave it out if it is wrong: {}",
+        kinds.join(" ")
+    ))
 }
 
 /// Explains the twin, lets the detector learn and writes the folder; gives the page.
@@ -129,13 +151,8 @@ fn set_up(
         let problem = Problem::new(format!("the recordings cannot be explained: {reason}"));
         return Err(Failure::Rejected(problem.into()));
     }
-    if let Some(fault) = no_line
-        .as_ref()
-        .filter(|_| !outcome.report.hands_out_twin())
-    {
-        let problem = Problem::new(format!("no twin fits these recordings: {fault}"));
-        let help = outcome.report.summary.clone();
-        return Err(Failure::Rejected(problem.help(help).into()));
+    if no_line.is_some() && !outcome.report.hands_out_twin() {
+        return Err(Failure::Rejected(mended(&outcome.report).into()));
     }
     request.cell.facts.effort_unit = unit_of(&outcome.report);
     let hold = interrupt::hold();

@@ -47,6 +47,8 @@ pub struct Told<'a> {
     pub state_topic: Option<&'a str>,
     /// The unit of the effort, where it is given.
     pub effort_unit: Option<EffortUnit>,
+    /// Effects and faults of recordings that are left out of the explanation.
+    pub without: &'a std::collections::BTreeSet<String>,
 }
 
 impl Told<'_> {
@@ -121,7 +123,7 @@ impl Told<'_> {
             fit: self.recordings,
             holdout: &[],
         };
-        explain::from_arguments(&arguments, std::collections::BTreeSet::new())
+        explain::from_arguments(&arguments, self.without.clone())
     }
 
     /// The unit that the explanation begins with, and how it was chosen: motor current where joints that bear weight

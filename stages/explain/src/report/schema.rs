@@ -108,13 +108,17 @@ impl Report {
         in_words.collect()
     }
 
-    /// Whether there is a corrected twin for a pipeline. One of mended recordings would not fit what the robot publishes;
-    /// a pipeline does not use a velocity that is not the derivative of the position.
+    /// Whether there is a corrected twin for a pipeline. One of mended recordings would not fit what the robot publishes.
     pub fn hands_out_twin(&self) -> bool {
-        let unfit = |finding: &Finding| {
+        self.verdict != Verdict::NotEvaluated && self.mended().next().is_none()
+    }
+
+    /// The faults of the recordings that were mended and that a pipeline would meet again. It does not use a velocity that
+    /// is not the derivative of the position, and leaves efforts out that drop to zero.
+    pub fn mended(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|finding| {
             finding.is_slip() && !finding.is_of_velocity() && finding.known_as() != "effort_dropout"
-        };
-        self.verdict != Verdict::NotEvaluated && !self.findings.iter().any(unfit)
+        })
     }
 }
 
