@@ -66,7 +66,7 @@ pub struct Args {
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
     /// Search for effects. `inference` is to replace `stepwise`: its intervals hold the truth more often, and it still names too
-    /// much where a joint is elastic or the arm touches a wall.
+    /// much where several effects act at the same time.
     #[arg(long, value_enum, default_value_t)]
     method: Method,
     #[command(flatten)]

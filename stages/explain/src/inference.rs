@@ -5,7 +5,11 @@
 //! explanation with its prior, in which the effects are tangents at the last explanation ([`variants`]). [`search`] looks
 //! for the best explanation, [`refine`] finds its most probable numbers, and the next round begins there.
 
+mod around;
+mod curves;
+mod left_out;
 mod margins;
+mod nested;
 mod noise;
 mod nuisance;
 mod objective;
@@ -14,28 +18,32 @@ mod refine;
 pub mod remainder;
 mod rows;
 mod search;
+mod sharpen;
 mod space;
 mod state;
+mod temper;
 mod variants;
 
-use nalgebra::DMatrix;
-use tauscope_dynamics::terms::{Layer, Time};
+use nalgebra::{DMatrix, DVector};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
 
+use left_out::LeftOut;
+pub use margins::AS_LIKELY;
 use margins::{Alternative, margins};
 use nuisance::{Nuisance, Source};
 use objective::{Objective, Set};
+use prior::Magnitude;
 use refine::Solution;
 use space::Space;
 use state::State;
-use variants::Variant;
+use variants::{Given, Variant};
 
 /// Most rounds of linearising, estimating the noise and searching. Resolution: bounds the computing time.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 10;
 
 /// An explanation and what is known of it.
 #[derive(Debug)]
@@ -64,7 +72,6 @@ pub fn infer(
 ) -> Inferred {
     let mut state = State::new(problem, bodies);
     let mut fit = Fit::new(problem, start);
-    let mut history: Vec<Vec<Hypothesis>> = Vec::new();
     let mut round = 0;
     loop {
         say("comparing explanations");
@@ -73,11 +80,24 @@ pub fn infer(
         let given = variants::all(problem, &fit, hypotheses, &state.efforts);
         let measured = variants::measured(problem, &fit);
         state.estimate_noise(&fit, &nuisances, &given, &measured, round == 0);
+        if round == 0 {
+            let linear = linear_columns(&given);
+            state.estimate_tempers(&fit, &nuisances, &linear, &measured);
+        }
         let space = state.space(&nuisances);
-        let objective = Objective::new(&space, &measured, given);
+        let mut objective = Objective::new(&space, &measured, given);
         let own: Set = (0..fit.actives.len()).collect();
+        objective.extend(sharpen::sharpened(
+            problem,
+            &fit,
+            &objective,
+            &own,
+            &state.efforts,
+        ));
         let (found, is_partial) =
             first_that_bends(&objective, &own, search::search(&objective, own.clone()));
+        let found = nested::simplest(&objective, found);
+        let gained = objective.score(&found) - objective.score(&own);
         let solution = without_idle(
             problem,
             &space,
@@ -86,7 +106,7 @@ pub fn infer(
         );
         let effects: Vec<Hypothesis> = solution.fit.actives.iter().map(|a| a.hypothesis).collect();
         round += 1;
-        let is_settled = !is_partial && history.contains(&effects);
+        let is_settled = round > 1 && !is_partial && gained < AS_LIKELY;
         if is_settled || round == ROUNDS {
             let (margins, alternatives) = margins(&objective, &found, &effects);
             return Inferred {
@@ -101,7 +121,8 @@ pub fn infer(
         fit = solution.fit;
         state.estimate_scales(&fit, &sizes);
         state.mark_tail(&space, &fit);
-        history.push(effects);
+        let (columns, measured) = tangents(problem, &fit, &state.efforts);
+        state.estimate_tempers(&fit, &nuisances, &columns, &measured);
     }
 }
 
@@ -110,9 +131,8 @@ pub fn infer(
 fn first_that_bends(objective: &Objective<'_>, own: &Set, found: Set) -> (Set, bool) {
     let bends = |v: &usize| {
         let hypothesis = objective.variants[*v].hypothesis;
-        let effect = hypothesis.effect;
-        let is_shaped = !hypothesis.is_linear() && effect.time() == Time::Always;
-        effect.layer == Layer::Body && (is_shaped || effect.traits.bends)
+        hypothesis.only_joint().is_none()
+            && (!hypothesis.is_linear() || hypothesis.effect.traits.bends)
     };
     let new: Vec<usize> = found
         .iter()
@@ -166,13 +186,20 @@ fn without_idle(
     }
 }
 
-/// Features of the motion that predict what a fit leaves in recordings that it was not fitted on.
-fn remaining(
-    problem: &Problem,
-    space: &Space,
-    fit: &Fit,
-    efforts: &[f64],
-) -> Vec<remainder::Predicted> {
+/// The columns of all effects that are linear in their numbers, scaled by their prior standard deviations.
+fn linear_columns(given: &[Given]) -> Vec<Column> {
+    let is_linear = |v: &Variant| v.hypothesis.is_linear() && v.curve.is_none();
+    let of = |given: &Given| -> Vec<Column> {
+        let pairs = given.factors.iter().zip(&given.variant.deviations);
+        pairs.map(|(c, deviation)| c.times(*deviation)).collect()
+    };
+    let linear = given.iter().filter(|given| is_linear(&given.variant));
+    linear.flat_map(of).collect()
+}
+
+/// The columns of a fit's effects, scaled by their prior standard deviations, and the effort that they and the nuisances
+/// are to explain.
+fn tangents(problem: &Problem, fit: &Fit, efforts: &[Magnitude]) -> (Vec<Column>, Column) {
     let mut measured = Column {
         joint: None,
         values: fit.residual.clone(),
@@ -192,30 +219,29 @@ fn remaining(
             for (value, x) in measured.values[first..].iter_mut().zip(&column.values) {
                 *value += factor * x;
             }
-            let values = column.values.iter().map(|x| deviation * x).collect();
-            columns.push(Column {
-                joint: column.joint,
-                values,
-            });
+            columns.push(column.times(*deviation));
         }
     }
-    let residuals = space.left_out(&columns, &measured, problem.tracks.len());
-    let of_joint = |joint: usize| {
-        let accelerations =
-            |r: usize, k: usize| problem.tracks[r].track.acceleration[k * problem.joints + joint];
-        let acceleration = nuisance::column_of(problem, joint, accelerations);
-        let curves = nuisance::curves(problem, fit, joint).into_iter();
-        let curves = curves.map(|curve| (curve.of, curve.columns));
-        let all = curves.chain([("acceleration", vec![acceleration])]);
-        let feature = move |(name, columns): (&'static str, Vec<Column>)| remainder::Feature {
-            name,
-            joint,
-            columns: columns.into_iter().map(|column| column.values).collect(),
-        };
-        all.map(feature).collect::<Vec<_>>()
+    (columns, measured)
+}
+
+/// Features of the motion that predict what a fit leaves in recordings that it was not fitted on.
+fn remaining(
+    problem: &Problem,
+    space: &Space,
+    fit: &Fit,
+    efforts: &[Magnitude],
+) -> Vec<remainder::Predicted> {
+    let recordings = problem.tracks.len();
+    let (columns, measured) = tangents(problem, fit, efforts);
+    let Some(left_out) = LeftOut::new(space, &columns, &measured, recordings) else {
+        return Vec::new();
     };
-    let features: Vec<remainder::Feature> = (0..problem.joints).flat_map(of_joint).collect();
-    remainder::predicted(space, &residuals, &features)
+    let of = |joint: usize| (0..recordings).map(move |r| (joint, r));
+    let residuals: Vec<Vec<DVector<f64>>> = (0..problem.joints)
+        .map(|joint| of(joint).map(|(j, r)| left_out.residual(j, r)).collect())
+        .collect();
+    remainder::predicted(space, &residuals, &remainder::features(problem, fit))
 }
 
 /// The mean changes of the links' inertial parameters.

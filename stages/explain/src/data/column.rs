@@ -19,6 +19,15 @@ impl Column {
             None => Some(&self.values[joint * rows..(joint + 1) * rows]),
         }
     }
+
+    /// The column times a factor.
+    #[must_use]
+    pub fn times(&self, factor: f64) -> Self {
+        Self {
+            joint: self.joint,
+            values: self.values.iter().map(|x| factor * x).collect(),
+        }
+    }
 }
 
 /// The columns of a hypothesis at some shape.

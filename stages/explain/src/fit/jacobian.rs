@@ -180,7 +180,7 @@ impl Fit {
 }
 
 /// Step of the difference quotient of a coordinate.
-fn step_of(problem: &Problem, active: &Active, c: usize) -> f64 {
+pub(crate) fn step_of(problem: &Problem, active: &Active, c: usize) -> f64 {
     let value = active.coordinates[c];
     match active.kind(c) {
         CoordinateKind::Factor { step, .. } => step,

@@ -2,9 +2,12 @@
 
 use crate::physics::active::Hypothesis;
 
+use super::around::Around;
 use super::objective::{Objective, Set};
 use super::variants::simplest;
 
+/// An explanation that is less far behind explains the recordings as well \[nats\]. Statistical: odds of 20 to 1.
+pub const AS_LIKELY: f64 = 3.0;
 /// Alternatives that are kept of each effect. Resolution: reports list three.
 const KEPT: usize = 5;
 
@@ -24,6 +27,7 @@ pub fn margins(
     effects: &[Hypothesis],
 ) -> (Vec<f64>, Vec<Vec<Alternative>>) {
     let whole = objective.score(set);
+    let around = Around::new(objective, set);
     let of = |own: &Hypothesis| {
         let Some(&v) = set
             .iter()
@@ -33,9 +37,7 @@ pub fn margins(
         };
         let less: Set = set.iter().copied().filter(|w| *w != v).collect();
         let score = objective.score(&less);
-        let gains = objective
-            .additions_of(&less, objective.related(v))
-            .into_iter();
+        let gains = (around.iter()).flat_map(|a| a.additions(&[v], objective.related(v)));
         let mut others: Vec<Alternative> = gains
             .map(|(w, gain)| Alternative {
                 hypothesis: objective.variants[w].hypothesis,

@@ -109,6 +109,16 @@ impl Whitener {
         filter
     }
 
+    /// The filter of a likelihood that is raised to the power `weight`.
+    #[must_use]
+    pub fn tempered(mut self, weight: f64) -> Self {
+        self.half_log_det *= weight;
+        for inverse in &mut self.inverse {
+            *inverse *= weight.sqrt();
+        }
+        self
+    }
+
     /// Whitens one column of picked rows in place.
     pub fn apply(&self, column: &mut [f64]) {
         let mut mean = 0.0;
@@ -202,7 +212,8 @@ fn quadratic(filter: &Whitener, y: &[f64], columns: &DMatrix<f64>) -> f64 {
         filter.apply(column.as_mut_slice());
     }
     let y = DVector::from_vec(white_y);
-    let mut normal = white.tr_mul(&white);
+    // The product of matrices is blocked, that of a transpose is not.
+    let mut normal = white.transpose() * &white;
     for i in 0..normal.nrows() {
         normal[(i, i)] += 1.0;
     }
@@ -222,7 +233,7 @@ fn compressed(columns: &DMatrix<f64>, effort_rms: f64) -> DMatrix<f64> {
     if columns.ncols() == 0 {
         return columns.clone();
     }
-    let eigen = SymmetricEigen::new(columns.tr_mul(columns));
+    let eigen = SymmetricEigen::new(columns.transpose() * columns);
     let least = (1e-3 * effort_rms).powi(2) * columns.nrows() as f64;
     let kept: Vec<usize> = (0..columns.ncols())
         .filter(|&i| eigen.eigenvalues[i] > least)

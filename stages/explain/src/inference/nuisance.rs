@@ -334,10 +334,20 @@ fn of_bandwidth(problem: &Problem, fit: &Fit, joint: usize) -> Nuisance {
     }
 }
 
-/// The joint's effort shifted in time.
-fn of_stamps(problem: &Problem, fit: &Fit, joint: usize) -> (f64, Nuisance) {
+/// Derivative of a joint's effort with respect to time: its negative is the change per second of delay.
+pub fn late(problem: &Problem, fit: &Fit, joint: usize) -> Column {
     let n = problem.joints;
     let recorded = &fit.efforts(problem).recorded;
+    column_of(problem, joint, |r, k| {
+        let (time, effort) = (&problem.tracks[r].track.time_s, &recorded[r]);
+        let (before, after) = (k.saturating_sub(1), (k + 1).min(time.len() - 1));
+        let span_s = (time[after] - time[before]).max(1e-9);
+        (effort[after * n + joint] - effort[before * n + joint]) / span_s
+    })
+}
+
+/// The joint's effort shifted in time, and by how much.
+fn of_stamps(problem: &Problem, fit: &Fit, joint: usize) -> (f64, Nuisance) {
     let mut shift_s = STAMP_S;
     for track in &problem.tracks {
         let time = &track.track.time_s;
@@ -346,16 +356,10 @@ fn of_stamps(problem: &Problem, fit: &Fit, joint: usize) -> (f64, Nuisance) {
             shift_s = shift_s.max(0.5 * mean.min(0.01));
         }
     }
-    let column = column_of(problem, joint, |r, k| {
-        let (time, effort) = (&problem.tracks[r].track.time_s, &recorded[r]);
-        let (before, after) = (k.saturating_sub(1), (k + 1).min(time.len() - 1));
-        let span_s = (time[after] - time[before]).max(1e-9);
-        shift_s * (effort[after * n + joint] - effort[before * n + joint]) / span_s
-    });
     (
         shift_s,
         Nuisance {
-            column,
+            column: late(problem, fit, joint).times(shift_s),
             source: Source::Stamp,
         },
     )

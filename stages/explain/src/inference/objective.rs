@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::data::column::Column;
 use crate::select::parallel;
 
-use super::space::{Space, Whitened};
+use super::space::{Measured, Space, Whitened};
 use super::variants::{Given, Variant};
 
 /// Correlation of two columns from which on one may take the place of the other. Resolution: changes the computing time.
@@ -23,13 +23,14 @@ pub type Set = Vec<usize>;
 
 /// The objective: see the module.
 pub struct Objective<'a> {
-    space: &'a Space,
+    pub(super) space: &'a Space,
+    pub(super) measured: Measured,
     /// Hypotheses at the shapes that are tried.
     pub variants: Vec<Variant>,
-    columns: Vec<Whitened>,
+    pub(super) columns: Vec<Whitened>,
     gram: Vec<OnceLock<Vec<f64>>>,
     /// Products within each variant: offset first, if it has one.
-    own: Vec<DMatrix<f64>>,
+    pub(super) own: Vec<DMatrix<f64>>,
     /// Square of each column, nuisances projected out.
     squares: Vec<f64>,
     related: Vec<OnceLock<Vec<usize>>>,
@@ -37,31 +38,20 @@ pub struct Objective<'a> {
 }
 
 /// Factored normal equations of a set.
-struct Base {
+pub(super) struct Base {
     set: Set,
-    lower: DMatrix<f64>,
+    pub(super) lower: DMatrix<f64>,
     /// Columns of the set, without offsets.
-    index: Vec<usize>,
-    offsets: Vec<usize>,
-    solved: DVector<f64>,
+    pub(super) index: Vec<usize>,
+    pub(super) offsets: Vec<usize>,
+    pub(super) solved: DVector<f64>,
 }
 
 impl<'a> Objective<'a> {
     /// The objective for a measurement, a signal, and the columns of variants.
     pub fn new(space: &'a Space, measured: &Column, given: Vec<Given>) -> Self {
-        let measured = space.measured(measured);
-        let whiten = |given: &Given| {
-            let offset = given
-                .alone
-                .iter()
-                .map(|column| space.column(column, 1.0, &measured));
-            let factors = given.factors.iter().zip(&given.variant.deviations);
-            let factors =
-                factors.map(|(column, deviation)| space.column(column, *deviation, &measured));
-            offset.chain(factors).collect::<Vec<Whitened>>()
-        };
-        let whitened = parallel::map(&given, whiten);
         let mut objective = Self {
+            measured: space.measured(measured),
             space,
             variants: Vec::new(),
             columns: Vec::new(),
@@ -71,31 +61,42 @@ impl<'a> Objective<'a> {
             related: Vec::new(),
             scores: Mutex::default(),
         };
-        for (given, columns) in given.into_iter().zip(whitened) {
-            let mut variant = given.variant;
-            let at = objective.columns.len();
-            variant.offset = given.alone.is_some().then_some(at);
-            variant.first = at + usize::from(given.alone.is_some());
-            let product = |a: &Whitened, b: &Whitened| space.product(a, b);
-            let m = columns.len();
-            objective
-                .squares
-                .extend(columns.iter().map(|c| product(c, c)));
-            objective.related.push(OnceLock::new());
-            objective.own.push(DMatrix::from_fn(m, m, |a, b| {
-                product(&columns[a], &columns[b])
-            }));
-            objective.columns.extend(columns);
-            objective.variants.push(variant);
-        }
-        objective.gram = (0..objective.columns.len())
-            .map(|_| OnceLock::new())
-            .collect();
+        objective.extend(given);
         objective
     }
 
+    /// The columns of a variant, whitened: its offset first, if it has one.
+    pub(super) fn whitened(&self, given: &Given) -> Vec<Whitened> {
+        let column = |column: &Column, scale: f64| self.space.column(column, scale, &self.measured);
+        let offset = given.alone.iter().map(|alone| column(alone, 1.0));
+        let factors = given.factors.iter().zip(&given.variant.deviations);
+        let factors = factors.map(|(factor, deviation)| column(factor, *deviation));
+        offset.chain(factors).collect()
+    }
+
+    /// Adds variants, behind those that it has.
+    pub fn extend(&mut self, given: Vec<Given>) {
+        let whitened = parallel::map(&given, |given| self.whitened(given));
+        for (given, columns) in given.into_iter().zip(whitened) {
+            let mut variant = given.variant;
+            let at = self.columns.len();
+            variant.offset = given.alone.is_some().then_some(at);
+            variant.first = at + usize::from(given.alone.is_some());
+            let product = |a: &Whitened, b: &Whitened| self.space.product(a, b);
+            let m = columns.len();
+            self.squares.extend(columns.iter().map(|c| product(c, c)));
+            self.own.push(DMatrix::from_fn(m, m, |a, b| {
+                product(&columns[a], &columns[b])
+            }));
+            self.columns.extend(columns);
+            self.variants.push(variant);
+        }
+        self.gram = self.columns.iter().map(|_| OnceLock::new()).collect();
+        self.related = self.variants.iter().map(|_| OnceLock::new()).collect();
+    }
+
     /// Products of one column with all.
-    fn gram(&self, column: usize) -> &[f64] {
+    pub(super) fn gram(&self, column: usize) -> &[f64] {
         self.gram[column].get_or_init(|| {
             let a = &self.columns[column];
             let of = |b: &Whitened| self.space.product(a, b);
@@ -103,7 +104,7 @@ impl<'a> Objective<'a> {
         })
     }
 
-    fn base(&self, set: &Set) -> Option<Base> {
+    pub(super) fn base(&self, set: &Set) -> Option<Base> {
         let variants = || set.iter().map(|&v| &self.variants[v]);
         let index: Vec<usize> = variants().flat_map(Variant::columns).collect();
         let offsets: Vec<usize> = variants().filter_map(|v| v.offset).collect();
@@ -200,7 +201,7 @@ impl<'a> Objective<'a> {
     }
 
     /// Whether a variant may join a set.
-    fn fits(&self, set: &Set, variant: usize) -> bool {
+    pub(super) fn fits(&self, set: &Set, variant: usize) -> bool {
         let own = &self.variants[variant];
         let alike = set
             .iter()
@@ -232,75 +233,51 @@ impl<'a> Objective<'a> {
         })
     }
 
-    /// Gain in value by each variant added to a set \[nats\]; minus infinity where it cannot join.
-    pub fn additions(&self, set: &Set) -> Vec<f64> {
-        let variants: Vec<usize> = (0..self.variants.len()).collect();
-        let gains = self.additions_of(set, &variants);
-        gains.into_iter().map(|(_, gain)| gain).collect()
-    }
-
-    /// Gain in value by some variants added to a set \[nats\], as [`Objective::additions`].
-    pub fn additions_of(&self, set: &Set, variants: &[usize]) -> Vec<(usize, f64)> {
-        let Some(base) = self.base(set) else {
-            return variants.iter().map(|&v| (v, f64::NEG_INFINITY)).collect();
+    /// Gain in value by adding a variant to a set \[nats\], from the products of its columns beside the set: the offset
+    /// first, if it has one.
+    pub(super) fn gain(
+        variant: &Variant,
+        has_offset: bool,
+        own: &DMatrix<f64>,
+        right: &DVector<f64>,
+    ) -> f64 {
+        let offset = usize::from(has_offset);
+        let mut right = right.clone();
+        let mut gain = variant.log_prior;
+        if offset == 1 {
+            gain += right[0] - 0.5 * own[(0, 0)];
+            right -= own.column(0);
+        }
+        let q = right.len() - offset;
+        if q == 0 {
+            return gain;
+        }
+        let mut normal = own.view((offset, offset), (q, q)).into_owned();
+        for i in 0..q {
+            normal[(i, i)] += 1.0;
+        }
+        let Some(factor) = normal.cholesky() else {
+            return f64::NEG_INFINITY;
         };
-        let p = base.index.len();
-        let rows: Vec<&[f64]> = base.index.iter().map(|&i| self.gram(i)).collect();
-        let offset_rows: Vec<&[f64]> = base.offsets.iter().map(|&o| self.gram(o)).collect();
-        let one = |&v: &usize| {
-            if !self.fits(set, v) {
-                return f64::NEG_INFINITY;
-            }
-            let variant = &self.variants[v];
-            let offset = usize::from(variant.offset.is_some());
-            let columns = variant.first - offset..variant.first + variant.deviations.len();
-            let m = columns.len();
-            let mut cross = DMatrix::from_fn(p, m, |a, c| rows[a][columns.start + c]);
-            base.lower.solve_lower_triangular_mut(&mut cross);
-            let own = &self.own[v] - cross.tr_mul(&cross);
-            let mut right = DVector::from_fn(m, |c, _| {
-                let at = columns.start + c;
-                self.columns[at].right - offset_rows.iter().map(|row| row[at]).sum::<f64>()
-            });
-            right -= cross.tr_mul(&base.solved);
-            let mut gain = variant.log_prior;
-            if offset == 1 {
-                gain += right[0] - 0.5 * own[(0, 0)];
-                let shift = own.column(0).into_owned();
-                right -= shift;
-            }
-            let q = m - offset;
-            if q == 0 {
-                return gain;
-            }
-            let mut normal = own.view((offset, offset), (q, q)).into_owned();
-            for i in 0..q {
-                normal[(i, i)] += 1.0;
-            }
-            let Some(factor) = normal.cholesky() else {
-                return f64::NEG_INFINITY;
-            };
-            let right = right.rows(offset, q).into_owned();
-            let mean = factor.solve(&right);
-            gain += 0.5 * right.dot(&mean);
-            let lower = factor.l_dirty();
-            gain -= lower.diagonal().iter().map(|d| d.ln()).sum::<f64>();
-            if variant.positive.contains(&true) {
-                let inverse = factor.inverse();
-                for (k, positive) in variant.positive.iter().enumerate() {
-                    if *positive {
-                        gain += log_twice_share_above_zero(mean[k] / inverse[(k, k)].sqrt());
-                    }
+        let right = right.rows(offset, q).into_owned();
+        let mean = factor.solve(&right);
+        gain += 0.5 * right.dot(&mean);
+        let lower = factor.l_dirty();
+        gain -= lower.diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        if variant.positive.contains(&true) {
+            let inverse = factor.inverse();
+            for (k, positive) in variant.positive.iter().enumerate() {
+                if *positive {
+                    gain += log_twice_share_above_zero(mean[k] / inverse[(k, k)].sqrt());
                 }
             }
-            gain
-        };
-        variants.iter().map(|v| (*v, one(v))).collect()
+        }
+        gain
     }
 }
 
 /// Posterior means of the scaled coefficients, and the inverse of the factor whose rows' norms are their deviations.
-fn mean_and_inverse(base: &Base) -> (DVector<f64>, DMatrix<f64>) {
+pub(super) fn mean_and_inverse(base: &Base) -> (DVector<f64>, DMatrix<f64>) {
     let p = base.index.len();
     let mut inverse = DMatrix::identity(p, p);
     base.lower.solve_lower_triangular_mut(&mut inverse);

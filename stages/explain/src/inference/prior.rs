@@ -5,6 +5,15 @@ use tauscope_dynamics::terms::{Coordinate, CoordinateKind, Family, PlaceKind, wo
 use crate::data::problem::Problem;
 use crate::physics::active::Hypothesis;
 
+/// Magnitude of a joint's measured effort \[N m or N\].
+#[derive(Debug, Clone, Copy)]
+pub struct Magnitude {
+    /// Root mean square.
+    pub rms: f64,
+    /// Largest value.
+    pub peak: f64,
+}
+
 /// Share of a joint's effort that an effect usually has. Chosen: of the order of friction on arms with gears.
 pub const USUAL_SHARE: f64 = 0.3;
 /// Usual mass that an arm carries, as a share of its own. Physical: rated payloads are a tenth to a third.
@@ -18,16 +27,18 @@ const CENTRE_M: f64 = 0.05;
 const TILT_RAD: f64 = 0.1;
 /// Usual offset of a joint's zero \[rad\]. Chosen: 1 degree.
 const ZERO_RAD: f64 = 0.02;
+/// Torque scale of which nothing is known. Resolution: so wide that it does not matter.
+const UNKNOWN_SCALE: f64 = 10.0;
 /// Usual deviation of a torque constant, as a share. Chosen: by order of magnitude.
 const GAIN_SHARE: f64 = 0.2;
 
 /// Standard deviations of the factors of a hypothesis, in the order of its factors. `column_peaks` are the largest
-/// values of the factors' columns over the joint's effort, at the joint where that is most; `effort` is that of its own joint.
+/// values of the factors' columns over the largest effort, at the joint where that is most; `effort` is that of its own joint.
 pub fn deviations(
     problem: &Problem,
     hypothesis: Hypothesis,
     column_peaks: &[f64],
-    effort: f64,
+    effort: Magnitude,
 ) -> Vec<f64> {
     let model = &problem.model;
     let arm_kg: f64 = model
@@ -45,6 +56,9 @@ pub fn deviations(
     let factors = hypothesis.effect.coordinates.iter();
     let factors = factors.filter(|c| matches!(c.kind, CoordinateKind::Factor { .. }));
     let of = |(coordinate, peak): (&Coordinate, &f64)| {
+        if hypothesis.is_torque_scale() {
+            return UNKNOWN_SCALE;
+        }
         let of_effort = USUAL_SHARE / peak.max(1e-12);
         let usual = match words::unit(coordinate.name).map_or("", |(_, unit)| unit) {
             "kg" => mass_kg,
@@ -52,7 +66,7 @@ pub fn deviations(
             "kg m²" if family == Family::Body => mass_kg * CARRIED_AT_M * CARRIED_AT_M,
             "m" => CENTRE_M,
             "N" => USUAL_SHARE * 9.81 * arm_kg,
-            "N m" if hypothesis.only_joint().is_some() => USUAL_SHARE * effort,
+            "N m" if hypothesis.only_joint().is_some() => USUAL_SHARE * effort.rms,
             "rad" if hypothesis.effect.place == PlaceKind::Base => TILT_RAD,
             "rad" => ZERO_RAD,
             _ if hypothesis.effect.traits.is_scale => GAIN_SHARE,

@@ -7,6 +7,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::data::column::Column;
+use crate::data::problem::Problem;
+use crate::fit::fitted::Fit;
+
+use super::nuisance;
 use super::space::Space;
 
 /// Number of surrogates. Statistical: what exceeds all of them has a probability of at most one in sixty.
@@ -24,6 +29,45 @@ pub struct Feature {
     pub joint: usize,
     /// Its columns, as signals of the joint.
     pub columns: Vec<Vec<f64>>,
+}
+
+/// The features of all joints: curves of the motion, and the acceleration.
+pub fn features(problem: &Problem, fit: &Fit) -> Vec<Feature> {
+    let of_joint = |joint: usize| {
+        let accelerations =
+            |r: usize, k: usize| problem.tracks[r].track.acceleration[k * problem.joints + joint];
+        let acceleration = nuisance::column_of(problem, joint, accelerations);
+        let curves = nuisance::curves(problem, fit, joint).into_iter();
+        let curves = curves.map(|curve| (curve.of, curve.columns));
+        let late = nuisance::late(problem, fit, joint);
+        let later = column_in_session(problem, &late);
+        let all = curves.chain([
+            ("acceleration", vec![acceleration]),
+            ("change in time, as if it were late", vec![late]),
+            ("change in time, as if it were later and later", vec![later]),
+        ]);
+        let feature = move |(name, columns): (&'static str, Vec<Column>)| Feature {
+            name,
+            joint,
+            columns: columns.into_iter().map(|column| column.values).collect(),
+        };
+        all.map(feature).collect::<Vec<_>>()
+    };
+    (0..problem.joints).flat_map(of_joint).collect()
+}
+
+/// A joint's column times the time of the session.
+fn column_in_session(problem: &Problem, column: &Column) -> Column {
+    let mut values = column.values.clone();
+    for track in &problem.tracks {
+        for (row, &k) in track.rows().zip(&track.compared) {
+            values[row] *= track.track.session_s + track.track.time_s[k];
+        }
+    }
+    Column {
+        joint: column.joint,
+        values,
+    }
 }
 
 /// A feature that predicts the residual.

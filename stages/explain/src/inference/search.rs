@@ -7,6 +7,7 @@ use tauscope_dynamics::terms::PlaceKind;
 use crate::physics::active::Hypothesis;
 use crate::select::parallel;
 
+use super::around::Around;
 use super::objective::{Objective, Set};
 
 /// Sets that are kept from one step to the next. Chosen: for the computing time.
@@ -15,6 +16,8 @@ const BEAM: usize = 3;
 const ADDED: usize = 6;
 /// Best replacements that are tried for each effect. Resolution: changes the computing time.
 const REPLACED: usize = 3;
+/// Floods that a search begins with. Resolution: changes the computing time.
+const FLOODS: usize = 3;
 /// Most steps. Resolution: bounds the computing time; a step that gains nothing is the last.
 const STEPS: usize = 30;
 /// A step that gains less is the last \[nats\]. Resolution: of the objective's rounding.
@@ -22,20 +25,15 @@ const LEAST_GAIN: f64 = 1e-6;
 
 /// The best set that is found from `start`.
 pub fn search(objective: &Objective<'_>, start: Set) -> Set {
-    // Effects that all joints feel are tried before those of one joint, which together can imitate them, and after.
-    let common = |v: &usize| {
-        let hypothesis = objective.variants[*v].hypothesis;
-        hypothesis.only_joint().is_none() || hypothesis.is_ordinary()
-    };
-    let first: Vec<usize> = (0..objective.variants.len()).filter(common).collect();
     let all: Vec<usize> = (0..objective.variants.len()).collect();
-    let coarse = warm(objective, warm(objective, start.clone(), &first), &all);
-    let fine = warm(objective, start, &all);
-    let mut best = if objective.score(&coarse) > objective.score(&fine) {
-        coarse
-    } else {
-        fine
-    };
+    let mut best = start.clone();
+    let flooded = flooded(objective, &start).into_iter();
+    for set in flooded.chain([start]) {
+        let grown = warm(objective, set, &all);
+        if objective.score(&grown) > objective.score(&best) {
+            best = grown;
+        }
+    }
     let mut beam = vec![best.clone()];
     let mut done = BTreeSet::new();
     for _ in 0..STEPS {
@@ -68,6 +66,46 @@ pub fn search(objective: &Objective<'_>, start: Set) -> Set {
         beam = exact.into_iter().map(|(_, set)| set).collect();
     }
     best
+}
+
+/// Further sets to begin with. Effects that are added one by one can imitate others together. So one of these sets begins
+/// with the effects that all joints feel, the others with one effect at every joint, less those that gain nothing.
+fn flooded(objective: &Objective<'_>, start: &Set) -> Vec<Set> {
+    let every = 0..objective.variants.len();
+    let common = |v: &usize| {
+        let hypothesis = objective.variants[*v].hypothesis;
+        hypothesis.only_joint().is_none() || hypothesis.is_ordinary()
+    };
+    let first: Vec<usize> = every.clone().filter(common).collect();
+    let coarse = warm(objective, start.clone(), &first);
+    let mut kinds: Vec<&str> = Vec::new();
+    for v in every.clone() {
+        let hypothesis = objective.variants[v].hypothesis;
+        let own = hypothesis.effect.name;
+        let floods = hypothesis.only_joint().is_some()
+            && hypothesis.is_linear()
+            && !hypothesis.is_coupling()
+            && objective.variants[v].curve.is_none();
+        if floods && !kinds.contains(&own) {
+            kinds.push(own);
+        }
+    }
+    let of_kind = |kind: &&str| {
+        let own = |v: &usize| objective.variants[*v].hypothesis.effect.name == *kind;
+        let joined = every.clone().filter(own).fold(start.clone(), |set, v| {
+            if objective.fits(&set, v) {
+                with(&set, v)
+            } else {
+                set
+            }
+        });
+        let ebbed = without_idle(objective, joined);
+        (objective.score(&ebbed), ebbed)
+    };
+    let mut floods = parallel::map(&kinds, of_kind);
+    floods.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let best = floods.into_iter().take(FLOODS).map(|(_, set)| set);
+    std::iter::once(coarse).chain(best).collect()
 }
 
 /// The place of an effect: what is added at the same time in a warm start acts at different ones.
@@ -107,7 +145,10 @@ fn warm(objective: &Objective<'_>, start: Set, allowed: &[usize]) -> Set {
     let mut best = start;
     loop {
         let mut gains = vec![f64::NEG_INFINITY; objective.variants.len()];
-        for (v, gain) in objective.additions_of(&best, allowed) {
+        let Some(around) = Around::new(objective, &best) else {
+            return best;
+        };
+        for (v, gain) in around.additions(&[], allowed) {
             gains[v] = gain;
         }
         let mut picked: BTreeMap<(bool, usize), usize> = BTreeMap::new();
@@ -154,8 +195,13 @@ pub fn without_idle(objective: &Objective<'_>, mut best: Set) -> Set {
 /// The sets that one move makes of a set, with their first-order values.
 fn neighbours(objective: &Objective<'_>, set: &Set, next: &mut BTreeMap<Set, f64>) {
     let own = objective.score(set);
+    let Some(around) = Around::new(objective, set) else {
+        return;
+    };
     let mut offers: Vec<(Set, f64)> = Vec::new();
-    let gains = objective.additions(set);
+    let every: Vec<usize> = (0..objective.variants.len()).collect();
+    let gains = around.additions(&[], &every);
+    let gains: Vec<f64> = gains.into_iter().map(|(_, gain)| gain).collect();
     for v in ranked(&gains).into_iter().take(ADDED) {
         offers.push((with(set, v), own + gains[v]));
     }
@@ -164,9 +210,24 @@ fn neighbours(objective: &Objective<'_>, set: &Set, next: &mut BTreeMap<Set, f64
         .copied()
         .filter(|&v| !objective.variants[v].is_forced)
         .collect();
-    let of = |&v: &usize| replacements(objective, set, v);
+    let of = |&v: &usize| replacements(objective, &around, set, v);
     offers.extend(parallel::map(&free, of).into_iter().flatten());
-    // All effects of one joint but the ordinary ones, in exchange for one or two.
+    offers.extend(collapsed(objective, set, &free));
+    offers.extend(without_kinds(objective, set, &free));
+    offers.extend(merged(objective, &around, set, &free));
+    for (set, value) in offers {
+        let known = next.entry(set).or_insert(f64::NEG_INFINITY);
+        *known = known.max(value);
+    }
+}
+
+/// Gains in value by adding each of these variants to a set \[nats\].
+fn additions(objective: &Objective<'_>, set: &Set, variants: &[usize]) -> Vec<(usize, f64)> {
+    Around::new(objective, set).map_or_else(Vec::new, |around| around.additions(&[], variants))
+}
+
+/// Moves that exchange all effects of one joint but the ordinary ones for one or two.
+fn collapsed(objective: &Objective<'_>, set: &Set, free: &[usize]) -> Vec<(Set, f64)> {
     let mut joints: Vec<Option<usize>> = free
         .iter()
         .map(|&v| objective.variants[v].hypothesis.only_joint())
@@ -189,7 +250,7 @@ fn neighbours(objective: &Objective<'_>, set: &Set, next: &mut BTreeMap<Set, f64
             .collect();
         let mut offers = Vec::new();
         for _ in 0..2 {
-            let gains = objective.additions_of(&less, &at_joint);
+            let gains = additions(objective, &less, &at_joint);
             let Some((best, _)) = gains.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) else {
                 break;
             };
@@ -198,7 +259,40 @@ fn neighbours(objective: &Objective<'_>, set: &Set, next: &mut BTreeMap<Set, f64
         }
         offers
     };
-    offers.extend(parallel::map(&joints, collapse).into_iter().flatten());
+    parallel::map(&joints, collapse)
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// Moves that remove all effects of one kind: each of them may only make up for the others.
+fn without_kinds(objective: &Objective<'_>, set: &Set, free: &[usize]) -> Vec<(Set, f64)> {
+    let kinds: BTreeSet<&str> = free
+        .iter()
+        .map(|&v| objective.variants[v].hypothesis.effect.name)
+        .collect();
+    let mut offers = Vec::new();
+    for kind in kinds {
+        let is_kept = |v: &usize| {
+            let variant = &objective.variants[*v];
+            variant.is_forced || variant.hypothesis.effect.name != kind
+        };
+        let less: Set = set.iter().copied().filter(is_kept).collect();
+        if less.len() + 1 < set.len() {
+            let score = objective.score(&less);
+            offers.push((less, score));
+        }
+    }
+    offers
+}
+
+/// Moves that replace two effects by one.
+fn merged(
+    objective: &Objective<'_>,
+    around: &Around<'_>,
+    set: &Set,
+    free: &[usize],
+) -> Vec<(Set, f64)> {
     let pairs: Vec<(usize, usize)> = free
         .iter()
         .enumerate()
@@ -208,26 +302,27 @@ fn neighbours(objective: &Objective<'_>, set: &Set, next: &mut BTreeMap<Set, f64
     let merge = |&(v, w): &(usize, usize)| {
         let less = without(&without(set, v), w);
         let score = objective.score(&less);
-        let gains = objective.additions_of(&less, objective.related(v));
+        let gains = around.additions(&[v, w], objective.related(v));
         let best = gains
             .into_iter()
             .filter(|(x, _)| *x != w)
             .max_by(|a, b| a.1.total_cmp(&b.1));
         best.map(|(x, gain)| (with(&less, x), score + gain))
     };
-    offers.extend(parallel::map(&pairs, merge).into_iter().flatten());
-    for (set, value) in offers {
-        let known = next.entry(set).or_insert(f64::NEG_INFINITY);
-        *known = known.max(value);
-    }
+    parallel::map(&pairs, merge).into_iter().flatten().collect()
 }
 
 /// Moves that remove an effect of a set, replace it, or split it into two.
-fn replacements(objective: &Objective<'_>, set: &Set, v: usize) -> Vec<(Set, f64)> {
+fn replacements(
+    objective: &Objective<'_>,
+    around: &Around<'_>,
+    set: &Set,
+    v: usize,
+) -> Vec<(Set, f64)> {
     let less = without(set, v);
     let score = objective.score(&less);
     let mut offers = vec![(less.clone(), score)];
-    let mut gains = objective.additions_of(&less, objective.related(v));
+    let mut gains = around.additions(&[v], objective.related(v));
     gains.retain(|(_, gain)| gain.is_finite());
     gains.sort_by(|a, b| b.1.total_cmp(&a.1));
     for &(w, gain) in gains.iter().take(REPLACED) {
@@ -235,7 +330,7 @@ fn replacements(objective: &Objective<'_>, set: &Set, v: usize) -> Vec<(Set, f64
     }
     if let Some(&(w, gain)) = gains.first().filter(|(_, gain)| *gain > 0.0) {
         let half = with(&less, w);
-        let more = objective.additions_of(&half, objective.related(v));
+        let more = additions(objective, &half, objective.related(v));
         let second = more.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((x, more)) = second.filter(|(_, more)| more.is_finite()) {
             offers.push((with(&half, x), score + gain + more));

@@ -33,10 +33,11 @@ pub struct Measured {
 /// Rows, filters and nuisances of all joints: what turns signals into whitened products.
 #[derive(Debug)]
 pub struct Space {
-    rows: Vec<Rows>,
+    pub(super) rows: Vec<Rows>,
     filters: Vec<Whitener>,
-    first: Vec<usize>,
-    nuisances: Vec<(Option<usize>, Vec<f64>)>,
+    /// Index of each joint's first row in a whitened signal.
+    pub(super) first: Vec<usize>,
+    pub(super) nuisances: Vec<(Option<usize>, Vec<f64>)>,
     factor: Cholesky<f64, Dyn>,
     rows_of_problem: usize,
 }
@@ -108,7 +109,7 @@ impl Space {
     }
 
     /// Whitens a column: its rows at its joint, or at all joints one after the other.
-    fn whitened(&self, column: &Column, scale: f64) -> Vec<f64> {
+    pub(super) fn whitened(&self, column: &Column, scale: f64) -> Vec<f64> {
         let joints = match column.joint {
             Some(joint) => joint..joint + 1,
             None => 0..self.rows.len(),
@@ -182,84 +183,6 @@ impl Space {
             all[*recording].push(value);
         }
         all
-    }
-
-    /// The whitened residuals of each joint in each recording that is left out of the fit in its turn. `columns` are scaled by
-    /// their prior standard deviations.
-    pub fn left_out(
-        &self,
-        columns: &[Column],
-        measured: &Column,
-        recordings: usize,
-    ) -> Vec<Vec<DVector<f64>>> {
-        let joints = self.rows.len();
-        let mut all: Vec<(Option<usize>, Vec<f64>)> = self.nuisances.clone();
-        all.extend(columns.iter().map(|c| (c.joint, self.whitened(c, 1.0))));
-        all.push((None, self.whitened(measured, 1.0)));
-        let own = |column: &(Option<usize>, Vec<f64>), joint: usize| match column.0 {
-            Some(other) if other != joint => None,
-            Some(_) => Some(0),
-            None => Some(self.first[joint]),
-        };
-        // Rows of a joint in a recording follow each other.
-        let range = |joint: usize, recording: usize| {
-            let of = &self.rows[joint].recording;
-            of.partition_point(|r| *r < recording)..of.partition_point(|r| *r <= recording)
-        };
-        let count = all.len();
-        let product = |&(recording, a): &(usize, usize)| -> Vec<f64> {
-            let of = |b: usize| {
-                let part = |joint: usize| {
-                    let (i, j) = (own(&all[a], joint)?, own(&all[b], joint)?);
-                    let rows = range(joint, recording);
-                    Some(dot(&all[a].1[i..][rows.clone()], &all[b].1[j..][rows]))
-                };
-                (0..joints).filter_map(part).sum::<f64>()
-            };
-            (0..=a).map(of).collect()
-        };
-        let jobs: Vec<(usize, usize)> = (0..recordings)
-            .flat_map(|r| (0..count).map(move |a| (r, a)))
-            .collect();
-        let products = parallel::map(&jobs, product);
-        let gram = |recording: usize| {
-            DMatrix::from_fn(count, count, |a, b| {
-                products[recording * count + a.max(b)][a.min(b)]
-            })
-        };
-        let grams: Vec<DMatrix<f64>> = (0..recordings).map(gram).collect();
-        let whole = grams
-            .iter()
-            .fold(DMatrix::zeros(count, count), |sum, g| sum + g);
-        let p = count - 1;
-        let of_recording = |&recording: &usize| {
-            let others = &whole - &grams[recording];
-            let mut normal = others.view((0, 0), (p, p)).into_owned();
-            for i in 0..p {
-                normal[(i, i)] += 1.0;
-            }
-            let right = others.view((0, p), (p, 1)).column(0).into_owned();
-            normal
-                .cholesky()
-                .map_or_else(|| DVector::zeros(p), |factor| factor.solve(&right))
-        };
-        let numbers = parallel::map(&(0..recordings).collect::<Vec<_>>(), of_recording);
-        let residual = |joint: usize, recording: usize| {
-            let rows = range(joint, recording);
-            let mut left = DVector::from_column_slice(&all[p].1[self.first[joint]..][rows.clone()]);
-            for (a, number) in numbers[recording].iter().enumerate() {
-                if let Some(i) = own(&all[a], joint) {
-                    let values = &all[a].1[i..][rows.clone()];
-                    left.iter_mut()
-                        .zip(values)
-                        .for_each(|(left, x)| *left -= number * x);
-                }
-            }
-            left
-        };
-        (0..joints)
-            .map(|joint| (0..recordings).map(|r| residual(joint, r)).collect())
-            .collect()
     }
 
     /// Logarithm of the marginal likelihood of a measurement that only nuisances and noise make, up to a constant \[nats\].

@@ -8,11 +8,15 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::fit::least_squares::solved;
 
+use super::left_out::LeftOut;
 use super::noise::{self, Noise, Whitener};
 use super::nuisance::{self, Nuisance, Size};
 use super::objective::{Objective, Set};
+use super::prior::Magnitude;
+use super::remainder;
 use super::rows::Rows;
 use super::space::Space;
+use super::temper;
 use super::variants::{self, Given, Variant};
 
 /// Candidate scales of the errors of bodies, in usual errors. Resolution: of an estimate that some ten bodies allow, and that the heavy ones
@@ -33,11 +37,13 @@ pub struct State<'a> {
     problem: &'a Problem,
     bodies: bool,
     rows: Vec<Rows>,
-    /// Root mean square of each joint's measured effort \[N m or N\].
-    pub efforts: Vec<f64>,
+    /// Each joint's measured effort.
+    pub efforts: Vec<Magnitude>,
     noises: Vec<Noise>,
     /// Additional variance of each joint's rows: heavy tails.
     extra: Vec<Vec<f64>>,
+    /// Weight of each joint's likelihood.
+    pub(super) tempers: Vec<f64>,
     /// Scales of the errors of bodies and of laws, in usual errors.
     pub scales: [f64; 2],
 }
@@ -45,18 +51,26 @@ pub struct State<'a> {
 impl<'a> State<'a> {
     pub fn new(problem: &'a Problem, bodies: bool) -> Self {
         let rows: Vec<Rows> = (0..problem.joints).map(|j| Rows::of(problem, j)).collect();
-        let rms = |(joint, rows): (usize, &Rows)| {
+        let of = |(joint, rows): (usize, &Rows)| {
             let values = rows.pick(&problem.measured[problem.joint_rows(joint)]);
             let squares: f64 = values.iter().map(|x| x * x).sum();
-            (squares / values.len().max(1) as f64).sqrt().max(1e-9)
+            let peak = values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            Magnitude {
+                rms: (squares / values.len().max(1) as f64).sqrt().max(1e-9),
+                peak: peak.max(1e-9),
+            }
         };
-        let efforts: Vec<f64> = rows.iter().enumerate().map(rms).collect();
+        let efforts: Vec<Magnitude> = rows.iter().enumerate().map(of).collect();
         Self {
             problem,
             bodies,
-            noises: efforts.iter().map(|rms| Noise::start(*rms)).collect(),
+            noises: efforts
+                .iter()
+                .map(|effort| Noise::start(effort.rms))
+                .collect(),
             extra: rows.iter().map(|rows| vec![0.0; rows.len()]).collect(),
             scales: [1.0, 1.0],
+            tempers: vec![1.0; problem.joints],
             rows,
             efforts,
         }
@@ -64,7 +78,8 @@ impl<'a> State<'a> {
 
     pub fn space(&self, nuisances: &[Nuisance]) -> Space {
         let of = |joint: usize| {
-            Whitener::new(&self.rows[joint], &self.noises[joint], &self.extra[joint])
+            let filter = Whitener::new(&self.rows[joint], &self.noises[joint], &self.extra[joint]);
+            filter.tempered(self.tempers[joint])
         };
         let filters = (0..self.problem.joints).map(of).collect();
         let columns: Vec<&Column> = nuisances.iter().map(|n| &n.column).collect();
@@ -116,7 +131,7 @@ impl<'a> State<'a> {
                 };
                 let bounds = (white, most_slow);
                 self.noises[joint] =
-                    noise::estimate(&data, self.efforts[joint], self.noises[joint], bounds);
+                    noise::estimate(&data, self.efforts[joint].rms, self.noises[joint], bounds);
             }
         }
     }
@@ -153,6 +168,25 @@ impl<'a> State<'a> {
         }
     }
 
+    /// Estimates the weight of each joint's likelihood, next to nuisances and `columns` at their prior standard deviations.
+    pub fn estimate_tempers(
+        &mut self,
+        fit: &Fit,
+        nuisances: &[Nuisance],
+        columns: &[Column],
+        measured: &Column,
+    ) {
+        let recordings = self.problem.tracks.len();
+        if recordings < 2 {
+            return;
+        }
+        let space = self.space(nuisances);
+        let features = remainder::features(self.problem, fit);
+        if let Some(left_out) = LeftOut::new(&space, columns, measured, recordings) {
+            self.tempers = temper::tempers(&space, &left_out, &features, recordings, &self.tempers);
+        }
+    }
+
     /// Gives rows far outside the noise the variance with which they are at its tail.
     pub fn mark_tail(&mut self, space: &Space, fit: &Fit) {
         let residual = Column {
@@ -162,8 +196,11 @@ impl<'a> State<'a> {
         let all = space.innovations(&residual).into_iter().enumerate();
         for (joint, innovations) in all {
             let white = self.noises[joint].white.powi(2);
+            let weight = self.tempers[joint];
             for (extra, z) in self.extra[joint].iter_mut().zip(innovations) {
-                *extra += (white + *extra) * ((z / TAIL).powi(2) - 1.0).max(0.0);
+                // The earlier estimate is replaced, so that a row gets its weight back once it is explained.
+                let ratio = (z / TAIL).powi(2) / weight * (white + *extra) / white;
+                *extra = white * (ratio - 1.0).max(0.0);
             }
         }
     }
@@ -171,7 +208,7 @@ impl<'a> State<'a> {
     /// The magnitudes that nuisances are shares of.
     pub fn sizes(&self, fit: &Fit) -> Vec<Size> {
         let of = |joint: usize| Size {
-            effort: self.efforts[joint],
+            effort: self.efforts[joint].rms,
             friction: friction_rms(self.problem, fit, &self.rows[joint], joint),
         };
         (0..self.problem.joints).map(of).collect()

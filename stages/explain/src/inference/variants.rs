@@ -2,23 +2,20 @@
 
 use std::sync::Arc;
 
-use tauscope_dynamics::terms::{CoordinateKind, Table, UNKNOWN};
+use tauscope_dynamics::terms::CoordinateKind;
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
-use crate::physics::active::{Active, Hypothesis, TimeKind, Whereabouts, held_knots};
+use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::physics::friction::least;
-use crate::select::curve_axes::curves;
-use crate::select::curve_shapes::knot_columns;
 use crate::select::grid::shapes;
 use crate::select::parallel;
 use crate::select::propose::Base;
 
-use super::prior;
+use super::curves::{self, Curve};
+use super::prior::{self, Magnitude};
 
-/// Most knots of a curve. Resolution: more cost time and describe nothing that fewer do not.
-const MOST_KNOTS: usize = 16;
 /// Effort below which a column is silent, as a share of the joint's. Resolution: of the rounding of efforts.
 const SILENT: f64 = 1e-9;
 /// Usual number of times at which a change may happen. Resolution: that of the scan over a recording.
@@ -44,18 +41,14 @@ pub struct Variant {
     /// Whether every explanation has it.
     pub is_forced: bool,
     /// The curve of an `unknown`.
-    pub curve: Option<Table>,
+    pub curve: Option<Curve>,
 }
 
 impl Variant {
     /// The effect with these factors.
     pub fn with(&self, factors: &[f64]) -> Active {
         if let Some(curve) = &self.curve {
-            return Active {
-                hypothesis: self.hypothesis,
-                coordinates: factors.to_vec(),
-                curve: Some(curve.clone()),
-            };
+            return curve.with(factors);
         }
         let mut coordinates = self.shape.clone();
         for (&i, value) in self.hypothesis.factors().iter().zip(factors) {
@@ -66,8 +59,8 @@ impl Variant {
 
     /// The factors of an effect of this kind.
     pub fn factors_of(&self, active: &Active) -> Vec<f64> {
-        if self.curve.is_some() {
-            return active.coordinates.clone();
+        if let Some(curve) = &self.curve {
+            return curve.factors(&active.coordinates);
         }
         let factors = self.hypothesis.factors().into_iter();
         factors.map(|i| active.coordinates[i]).collect()
@@ -93,10 +86,19 @@ impl Variant {
             let (a, b) = (own.only_joint(), others.only_joint());
             return a.is_none() || b.is_none() || a == b;
         }
-        let against = |v: &Self| v.curve.as_ref().map(|c| (c.against, c.of_joint));
+        let against = |v: &Self| {
+            v.curve
+                .as_ref()
+                .map(|c| (c.table.against, c.table.of_joint))
+        };
         own.place == others.place
             && simplest(own) == simplest(others)
             && against(self) == against(other)
+    }
+
+    /// Indices of its columns: the offset, if it has one, and those of its factors.
+    pub fn with_offset(&self) -> std::ops::Range<usize> {
+        self.offset.unwrap_or(self.first)..self.columns().end
     }
 
     /// Indices of its factors' columns.
@@ -117,6 +119,18 @@ pub struct Given {
     pub is_silent: bool,
 }
 
+impl Given {
+    /// Makes it a curve, where its columns are those of the curve's values.
+    fn shape(&mut self, curve: Curve, sizes: &[Magnitude]) {
+        self.factors = curve.mixed(&self.factors);
+        let free = self.factors.len();
+        let usual = prior::USUAL_SHARE * sizes[curve.hypothesis.place.joint].rms;
+        self.variant.deviations = vec![usual; free];
+        self.variant.positive = vec![false; free];
+        self.variant.curve = Some(curve);
+    }
+}
+
 /// The simplest law that an effect contains.
 pub fn simplest(hypothesis: Hypothesis) -> &'static str {
     let effect = hypothesis.effect;
@@ -127,7 +141,12 @@ pub fn simplest(hypothesis: Hypothesis) -> &'static str {
 
 /// Every hypothesis at every shape of its grid, and at its most promising times; the effects of `fit` come first, as they
 /// are. The columns are tangents at `fit`.
-pub fn all(problem: &Problem, fit: &Fit, hypotheses: &[Hypothesis], sizes: &[f64]) -> Vec<Given> {
+pub fn all(
+    problem: &Problem,
+    fit: &Fit,
+    hypotheses: &[Hypothesis],
+    sizes: &[Magnitude],
+) -> Vec<Given> {
     let mut all = of_fit(problem, fit, sizes);
     let jobs: Vec<Hypothesis> = hypotheses.to_vec();
     let timed = Base::new(problem, fit, hypotheses.len());
@@ -152,51 +171,21 @@ pub fn all(problem: &Problem, fit: &Fit, hypotheses: &[Hypothesis], sizes: &[f64
     all
 }
 
-/// Curves of a joint's effort over what may act on it: what is described without a law.
-fn of_curves(problem: &Problem, fit: &Fit, joint: usize, sizes: &[f64]) -> Vec<Given> {
-    let place = Whereabouts {
-        joint,
-        ..Whereabouts::default()
-    };
-    let hypothesis = Hypothesis {
-        effect: &UNKNOWN,
-        place,
-    };
-    let mut tables = curves(problem, joint);
-    tables.retain(|curve| curve.of_joint == joint && curve.knots.len() <= MOST_KNOTS);
-    let count = tables.len();
-    let of = |curve: Table| {
-        let free = curve.knots.len() - held_knots(&curve, joint).len();
-        if free == 0 {
-            return None;
-        }
-        let active = Active {
-            hypothesis,
-            coordinates: vec![0.0; free],
-            curve: Some(curve.clone()),
-        };
-        let columns = knot_columns(problem, fit, &active)
-            .into_iter()
-            .map(Arc::new);
-        let mut given = given(
-            problem,
-            hypothesis,
-            Vec::new(),
-            (None, columns.collect()),
-            count,
-            sizes,
-        );
-        // Every value of a curve has the size of the whole.
-        given.variant.deviations = vec![prior::USUAL_SHARE * sizes[joint]; free];
-        given.variant.positive = vec![false; free];
-        given.variant.curve = Some(curve);
+/// The curves that are tried at a joint.
+fn of_curves(problem: &Problem, fit: &Fit, joint: usize, sizes: &[Magnitude]) -> Vec<Given> {
+    let all = curves::of_joint(problem, fit, joint);
+    let count = all.len();
+    let of = |(curve, columns): (Curve, Vec<Arc<Column>>)| {
+        let own = (None, columns);
+        let mut given = given(problem, curve.hypothesis, Vec::new(), own, count, sizes);
+        given.shape(curve, sizes);
         (!given.is_silent).then_some(given)
     };
-    tables.into_iter().filter_map(of).collect()
+    all.into_iter().filter_map(of).collect()
 }
 
 /// The effects of a fit as they are, one each, in their order.
-pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[f64]) -> Vec<Given> {
+pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[Magnitude]) -> Vec<Given> {
     let jacobian = fit.jacobian(problem);
     let free = fit.parameters();
     let of = |(i, active): (usize, &Active)| {
@@ -223,7 +212,7 @@ pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[f64]) -> Vec<Given> {
             .values
             .iter()
             .fold(0.0_f64, |most, x| most.max(x.abs()));
-        let most_effort = sizes.iter().copied().fold(0.0, f64::max);
+        let most_effort = sizes.iter().map(|size| size.rms).fold(0.0, f64::max);
         let alone = (largest > 1e-6 * most_effort).then_some(alone);
         let factors: Vec<Arc<Column>> = factors.into_iter().map(|(_, column)| column).collect();
         let mut given = given(
@@ -234,12 +223,8 @@ pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[f64]) -> Vec<Given> {
             1,
             sizes,
         );
-        if let Some(curve) = &active.curve {
-            let free = active.coordinates.len();
-            given.variant.deviations =
-                vec![prior::USUAL_SHARE * sizes[active.hypothesis.place.joint]; free];
-            given.variant.positive = vec![false; free];
-            given.variant.curve = Some(curve.clone());
+        if let Some(table) = &active.curve {
+            given.shape(Curve::new(table.clone(), active.hypothesis), sizes);
         }
         given
     };
@@ -274,14 +259,14 @@ pub fn measured(problem: &Problem, fit: &Fit) -> Column {
     }
 }
 
-/// A hypothesis at one shape; `None` if it changes no compared row.
-fn at(
+/// A hypothesis at one of the `count` shapes of its grid; `None` if it changes no compared row.
+pub fn at(
     problem: &Problem,
     fit: &Fit,
     hypothesis: Hypothesis,
     shape: Vec<f64>,
     count: usize,
-    sizes: &[f64],
+    sizes: &[Magnitude],
 ) -> Option<Given> {
     let columns = fit.columns(problem, hypothesis, &shape);
     let alone = columns.alone.clone();
@@ -303,7 +288,7 @@ fn given(
     shape: Vec<f64>,
     (alone, factors): (Option<Column>, Vec<Arc<Column>>),
     count: usize,
-    sizes: &[f64],
+    sizes: &[Magnitude],
 ) -> Given {
     let share = |column: &Column| {
         let of = |joint: usize| {
@@ -311,7 +296,7 @@ fn given(
             let weight = &problem.weight[problem.joint_rows(joint)];
             let counted = values.iter().zip(weight).filter(|(_, w)| **w > 0.0);
             let peak = counted.fold(0.0_f64, |most, (x, _)| most.max(x.abs()));
-            Some(peak / sizes[joint].max(1e-9))
+            Some(peak / sizes[joint].peak)
         };
         (0..problem.joints).filter_map(of).fold(0.0, f64::max)
     };
@@ -376,7 +361,11 @@ mod tests {
             at_joint("viscous_friction", 1).with(vec![0.5]),
         ];
         let fit = Fit::new(&problem, actives);
-        let given = of_fit(&problem, &fit, &[1.0, 1.0]);
+        let one = Magnitude {
+            rms: 1.0,
+            peak: 1.0,
+        };
+        let given = of_fit(&problem, &fit, &[one, one]);
         let silent: Vec<bool> = given.iter().map(|given| given.is_silent).collect();
         assert_eq!(silent, [true, false]);
     }

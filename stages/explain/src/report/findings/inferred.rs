@@ -3,7 +3,7 @@
 use crate::context::Context;
 use crate::fit::fitted::Fit;
 use crate::fit::interval::parameter_deviations;
-use crate::inference::Inferred;
+use crate::inference::{AS_LIKELY, Inferred};
 use crate::report::schema::Finding;
 use crate::report::sentences;
 use crate::select::search::Search;
@@ -12,8 +12,6 @@ use super::scales::{Scales, StartScales};
 use super::sizes::{effort_rms, mismatch};
 use super::{Named, drop_no_force, numbers, place_of, rival, when};
 
-/// An alternative that is less far behind explains the recordings as well \[nats\]. Statistical: odds of 20 to 1.
-const AS_LIKELY: f64 = 3.0;
 /// Log-odds of a finding without a margin, and how they grow with the logarithm of one plus the margin. Chosen: with arms of
 /// another hand in view; a calibration on seeds of its own is to replace it.
 const CONFIDENCE: [f64; 2] = [-0.5, 0.6];

@@ -1,0 +1,218 @@
+//! The values of all explanations that differ from one by a few effects.
+//!
+//! What each variant would add to a set is solved for once. Effects that leave the set are then taken out of these
+//! products by the inverse of their own block (Schur complement; Golub and Van Loan, *Matrix Computations*, 2013, section
+//! 3.2), so that trying everything in the place of each effect costs little more than trying it beside all.
+
+use std::sync::OnceLock;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::objective::{Base, Objective, Set, mean_and_inverse};
+use super::space::Whitened;
+
+/// A set with what its neighbours are compared by.
+pub struct Around<'a> {
+    objective: &'a Objective<'a>,
+    set: Set,
+    base: Base,
+    /// Inverse of the set's normal matrix.
+    inverse: DMatrix<f64>,
+    mean: DVector<f64>,
+    /// By variant, its products beside the set.
+    beside: Vec<OnceLock<Beside>>,
+}
+
+/// The columns of a variant beside a set.
+struct Beside {
+    /// Coefficients of the set's columns in each of its columns.
+    shares: DMatrix<f64>,
+    /// Products of what is left of its columns.
+    own: DMatrix<f64>,
+    /// Their products with what is left of the measurement.
+    right: DVector<f64>,
+}
+
+impl<'a> Around<'a> {
+    /// The neighbourhood of a set; nothing if its normal matrix cannot be factored.
+    pub fn new(objective: &'a Objective<'a>, set: &Set) -> Option<Self> {
+        let base = objective.base(set)?;
+        let (mean, half) = mean_and_inverse(&base);
+        Some(Self {
+            objective,
+            set: set.clone(),
+            inverse: &half * half.transpose(),
+            mean,
+            base,
+            beside: objective.variants.iter().map(|_| OnceLock::new()).collect(),
+        })
+    }
+
+    fn beside(&self, variant: usize) -> &Beside {
+        self.beside[variant].get_or_init(|| {
+            let objective = self.objective;
+            let columns = objective.variants[variant].with_offset();
+            let m = columns.len();
+            let rows = |of: &[usize]| of.iter().map(|&i| objective.gram(i)).collect::<Vec<_>>();
+            let (own, offsets) = (rows(&self.base.index), rows(&self.base.offsets));
+            let cross = DMatrix::from_fn(own.len(), m, |a, c| own[a][columns.start + c]);
+            let right = DVector::from_fn(m, |c, _| {
+                let at = columns.start + c;
+                objective.columns[at].right - offsets.iter().map(|row| row[at]).sum::<f64>()
+            });
+            self.of_products(&cross, &objective.own[variant], &right)
+        })
+    }
+
+    /// Products of some columns beside the set, from those with the set's columns, with each other, and with what the set's
+    /// offsets leave of the measurement.
+    fn of_products(
+        &self,
+        cross: &DMatrix<f64>,
+        own: &DMatrix<f64>,
+        right: &DVector<f64>,
+    ) -> Beside {
+        let shares = &self.inverse * cross;
+        Beside {
+            own: own - cross.tr_mul(&shares),
+            right: right - cross.tr_mul(&self.mean),
+            shares,
+        }
+    }
+
+    /// Products of columns that are no variant's beside the set: with each other, and with the measurement.
+    pub fn products(&self, columns: &[Whitened]) -> (DMatrix<f64>, DVector<f64>) {
+        let objective = self.objective;
+        let m = columns.len();
+        let product = |a: &Whitened, at: usize| objective.space.product(a, &objective.columns[at]);
+        let index = &self.base.index;
+        let cross = DMatrix::from_fn(index.len(), m, |a, c| product(&columns[c], index[a]));
+        let own = DMatrix::from_fn(m, m, |a, b| {
+            objective.space.product(&columns[a], &columns[b])
+        });
+        let right = DVector::from_fn(m, |c, _| {
+            let offsets = self.base.offsets.iter();
+            columns[c].right - offsets.map(|&o| product(&columns[c], o)).sum::<f64>()
+        });
+        let beside = self.of_products(&cross, &own, &right);
+        (beside.own, beside.right)
+    }
+
+    /// Gain in value by each of some variants where the effects `removed` leave the set, over the set without them
+    /// \[nats\]; minus infinity where it cannot join.
+    pub fn additions(&self, removed: &[usize], variants: &[usize]) -> Vec<(usize, f64)> {
+        let objective = self.objective;
+        let less: Set = (self.set.iter().copied())
+            .filter(|v| !removed.contains(v))
+            .collect();
+        // Rows of the removed effects in the normal matrix, and their offsets.
+        let is_of = |column: &usize| {
+            let of = |v: &usize| objective.variants[*v].columns().contains(column);
+            removed.iter().any(of)
+        };
+        let index = self.base.index.iter().enumerate();
+        let rows: Vec<usize> = index.filter(|(_, c)| is_of(c)).map(|(a, _)| a).collect();
+        let offsets: Vec<usize> = (removed.iter())
+            .filter_map(|&v| objective.variants[v].offset)
+            .collect();
+        let block = DMatrix::from_fn(rows.len(), rows.len(), |a, b| {
+            self.inverse[(rows[a], rows[b])]
+        });
+        let Some(block) = block.cholesky() else {
+            return variants.iter().map(|&v| (v, f64::NEG_INFINITY)).collect();
+        };
+        // Coefficients of the set's columns in the removed offsets, which return to the measurement.
+        let index = &self.base.index;
+        let returned = offsets.iter().fold(DVector::zeros(index.len()), |sum, &o| {
+            let row = objective.gram(o);
+            sum + DVector::from_iterator(index.len(), index.iter().map(|&i| row[i]))
+        });
+        let returned_shares = &self.inverse * &returned;
+        let mean = DVector::from_iterator(
+            rows.len(),
+            rows.iter().map(|&a| self.mean[a] + returned_shares[a]),
+        );
+        let mean = block.solve(&mean);
+        let one = |&v: &usize| {
+            if !objective.fits(&less, v) {
+                return (v, f64::NEG_INFINITY);
+            }
+            let beside = self.beside(v);
+            let columns = objective.variants[v].with_offset();
+            let shares = beside.shares.select_rows(&rows);
+            let own = &beside.own + shares.tr_mul(&block.solve(&shares));
+            let mut right = &beside.right + shares.tr_mul(&mean);
+            right -= beside.shares.tr_mul(&returned);
+            for (c, column) in columns.enumerate() {
+                let products = offsets.iter().map(|&o| objective.gram(o)[column]);
+                right[c] += products.sum::<f64>();
+            }
+            let variant = &objective.variants[v];
+            let has_offset = variant.offset.is_some();
+            (v, Objective::gain(variant, has_offset, &own, &right))
+        };
+        variants.iter().map(one).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::fitted::Fit;
+    use crate::fixture::{at_joint, problem_with};
+    use crate::inference::nuisance;
+    use crate::inference::state::State;
+    use crate::inference::variants;
+
+    #[test]
+    fn each_neighbour_has_the_value_that_it_has_by_itself() {
+        let problem = problem_with(3, |_, qd, effort| effort[0] += 1.2 * qd[0]);
+        let mut state = State::new(&problem, true);
+        let fit = Fit::new(&problem, Vec::new());
+        let sizes = state.sizes(&fit);
+        let nuisances = nuisance::of(&problem, &fit, &sizes, true, state.scales);
+        // Factors without a sign: those with one have another value next to each set.
+        let mut all = ["torque_bias", "torque_gain"]
+            .map(|name| [at_joint(name, 0), at_joint(name, 1)])
+            .concat();
+        let mut tilt = at_joint("base_tilt", 0);
+        tilt.place.link = 0;
+        all.push(tilt);
+        let mut given = variants::all(&problem, &fit, &all, &state.efforts);
+        given.retain(|given| given.variant.curve.is_none());
+        // A delay has an effort without any factor.
+        let delay = at_joint("torque_delay", 0);
+        given.extend(variants::at(
+            &problem,
+            &fit,
+            delay,
+            vec![0.02],
+            1,
+            &state.efforts,
+        ));
+        let measured = variants::measured(&problem, &fit);
+        state.estimate_noise(&fit, &nuisances, &given, &measured, true);
+        let space = state.space(&nuisances);
+        let objective = Objective::new(&space, &measured, given);
+        let last = objective.variants.len() - 1;
+        let set = vec![0, 2, last];
+        let around = Around::new(&objective, &set).unwrap();
+        for removed in [vec![], vec![0], vec![last], vec![2, last]] {
+            let less: Set = set
+                .iter()
+                .copied()
+                .filter(|v| !removed.contains(v))
+                .collect();
+            for (v, gain) in around.additions(&removed, &[1, 3, 4]) {
+                let mut more = less.clone();
+                more.push(v);
+                more.sort_unstable();
+                let own = objective.score(&more) - objective.score(&less);
+                assert!(
+                    (gain - own).abs() < 1e-6 * own.abs().max(1.0),
+                    "{v}: {gain}, {own}"
+                );
+            }
+        }
+    }
+}
