@@ -60,7 +60,7 @@ pub(super) static EFFECT: Effect = Effect {
 #[cfg(test)]
 mod tests {
     use super::super::base_tilt;
-    use super::super::tests::{TwoJoints, motion, run};
+    use super::super::tests::{TwoJoints, assert_near, motion, run};
     use super::*;
     use crate::Model;
 
@@ -76,7 +76,7 @@ mod tests {
         let always = run(&mut *always, &motion);
         for (i, now) in run(&mut *there, &motion).into_iter().enumerate() {
             let leans = session_s[i] < middle_s;
-            assert_eq!(now, if leans { always[i] } else { [0.0; 2] });
+            assert_near(now, if leans { always[i] } else { [0.0; 2] });
         }
         // The robot itself stands level before and after.
         let mut model: Model = robot.model.clone();

@@ -59,7 +59,7 @@ pub(super) static EFFECT: Effect = Effect {
 #[cfg(test)]
 mod tests {
     use super::super::joint_zero_offset;
-    use super::super::tests::{TwoJoints, motion, run};
+    use super::super::tests::{TwoJoints, assert_near, motion, run};
     use super::*;
 
     #[test]
@@ -74,7 +74,7 @@ mod tests {
         let always = run(&mut *always, &motion);
         for (i, now) in run(&mut *there, &motion).into_iter().enumerate() {
             let is_off = session_s[i] < middle_s;
-            assert_eq!(now, if is_off { always[i] } else { [0.0; 2] });
+            assert_near(now, if is_off { always[i] } else { [0.0; 2] });
         }
         // The robot itself stays as it is.
         assert!(!there.alter(&mut robot.model.clone()));

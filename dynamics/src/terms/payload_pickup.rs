@@ -68,7 +68,7 @@ pub(super) fn coordinates_with_times(p: &[f64]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{TwoJoints, motion, run};
+    use super::super::tests::{TwoJoints, assert_near, motion, run};
     use super::*;
 
     #[test]
@@ -77,13 +77,14 @@ mod tests {
         let site = robot.site_for(PlaceKind::Tool);
         let mut values = vec![2.0, 0.1, 0.0, 0.2, 0.1, 0.0, 0.0, 0.1, 0.0, 0.05];
         let mut payload = (super::super::payload::EFFECT.build)(&site, &values);
-        values.extend([0.3, 0.6]);
+        // Half way between samples, so that each is either within or without.
+        values.extend([0.295, 0.595]);
         let mut pickup = (EFFECT.build)(&site, &values);
         let motion = motion(&robot.model, 100);
         let always = run(&mut *payload, &motion);
         for (i, (at, now)) in motion.iter().zip(run(&mut *pickup, &motion)).enumerate() {
-            let there = (0.3..0.6).contains(&at.time_s);
-            assert_eq!(now, if there { always[i] } else { [0.0; 2] });
+            let there = (0.295..0.595).contains(&at.time_s);
+            assert_near(now, if there { always[i] } else { [0.0; 2] });
         }
         assert!(pickup.inertia().is_none());
     }

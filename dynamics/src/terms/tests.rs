@@ -90,6 +90,15 @@ pub(super) fn sample(
     }
 }
 
+/// Two efforts are the same but for rounding.
+pub(super) fn assert_near(found: [f64; 2], expected: [f64; 2]) {
+    let is_near = |(a, b): (f64, f64)| (a - b).abs() < 1e-9;
+    assert!(
+        found.into_iter().zip(expected).all(is_near),
+        "{found:?}, {expected:?}"
+    );
+}
+
 /// What a term adds at one instant, the first.
 pub(super) fn push(term: &mut dyn Term, q: [f64; 2], qd: [f64; 2], qdd: [f64; 2]) -> [f64; 2] {
     let mut effort = [0.0; 2];

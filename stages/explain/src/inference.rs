@@ -7,6 +7,7 @@
 
 mod around;
 mod curves;
+mod laws;
 mod left_out;
 mod margins;
 mod nested;

@@ -11,6 +11,7 @@ use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 
+use super::laws;
 use super::nuisance;
 use super::space::Space;
 
@@ -36,8 +37,8 @@ pub fn features(problem: &Problem, fit: &Fit) -> Vec<Feature> {
     let of_joint = |joint: usize| {
         let accelerations =
             |r: usize, k: usize| problem.tracks[r].track.acceleration[k * problem.joints + joint];
-        let acceleration = nuisance::column_of(problem, joint, accelerations);
-        let curves = nuisance::curves(problem, fit, joint).into_iter();
+        let acceleration = laws::column_of(problem, joint, accelerations);
+        let curves = laws::curves(problem, fit, joint).into_iter();
         let curves = curves.map(|curve| (curve.of, curve.columns));
         let late = nuisance::late(problem, fit, joint);
         let later = column_in_session(problem, &late);

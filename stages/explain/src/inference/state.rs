@@ -8,6 +8,7 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::fit::least_squares::solved;
 
+use super::laws;
 use super::left_out::LeftOut;
 use super::noise::{self, Noise, Whitener};
 use super::nuisance::{self, Nuisance, Size};
@@ -227,10 +228,10 @@ fn friction_rms(problem: &Problem, fit: &Fit, rows: &Rows, joint: usize) -> f64 
     let load = fit.load(problem);
     let speed = |r: usize, k: usize| track(r).velocity[k * n + joint];
     let columns = [
-        nuisance::column_of(problem, joint, |r, k| sign(speed(r, k))),
-        nuisance::column_of(problem, joint, speed),
-        nuisance::column_of(problem, joint, |r, k| track(r).acceleration[k * n + joint]),
-        nuisance::column_of(problem, joint, |r, k| load[r][k * n + joint]),
+        laws::column_of(problem, joint, |r, k| sign(speed(r, k))),
+        laws::column_of(problem, joint, speed),
+        laws::column_of(problem, joint, |r, k| track(r).acceleration[k * n + joint]),
+        laws::column_of(problem, joint, |r, k| load[r][k * n + joint]),
     ]
     .map(|column| rows.pick(&column.values));
     let matrix = DMatrix::from_fn(count, 5, |k, c| {
