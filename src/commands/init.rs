@@ -114,9 +114,11 @@ fn mended(report: &Report) -> Problem {
     let (mut faults, mut kinds) = (Vec::new(), Vec::new());
     for finding in report.mended() {
         faults.push(&*finding.sentence);
-        kinds.push(format!("--without {}", finding.known_as()));
+        let option = format!("--without {}", finding.known_as());
+        if !kinds.contains(&option) {
+            kinds.push(option);
+        }
     }
-    kinds.dedup();
     let problem = Problem::new(format!(
         "the recordings do not match the robot. {}",
         faults.join(" ")

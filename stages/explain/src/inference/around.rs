@@ -1,8 +1,8 @@
 //! The values of all explanations that differ from one by a few effects.
 //!
-//! What each variant would add to a set is solved for once. Effects that leave the set are then taken out of these
-//! products by the inverse of their own block (Schur complement; Golub and Van Loan, *Matrix Computations*, 2013, section
-//! 3.2), so that trying everything in the place of each effect costs little more than trying it beside all.
+//! The gain of each variant is solved for once. For effects that leave the set, the products are updated by the inverse of
+//! their block (Schur complement; Golub and Van Loan, *Matrix Computations*, 2013, section 3.2), so a replacement costs
+//! little more than an addition.
 
 use std::sync::OnceLock;
 
@@ -19,17 +19,17 @@ pub struct Around<'a> {
     /// Inverse of the set's normal matrix.
     inverse: DMatrix<f64>,
     mean: DVector<f64>,
-    /// By variant, its products beside the set.
+    /// By variant, the products of its residual columns.
     beside: Vec<OnceLock<Beside>>,
 }
 
-/// The columns of a variant beside a set.
+/// Residual columns of a variant: its columns less their regression on the columns of a set.
 struct Beside {
-    /// Coefficients of the set's columns in each of its columns.
+    /// Regression coefficients of its columns on the set's columns.
     shares: DMatrix<f64>,
-    /// Products of what is left of its columns.
+    /// Products of the residual columns with each other.
     own: DMatrix<f64>,
-    /// Their products with what is left of the measurement.
+    /// Products of the residual columns with the residual of the measurement.
     right: DVector<f64>,
 }
 
@@ -64,8 +64,8 @@ impl<'a> Around<'a> {
         })
     }
 
-    /// Products of some columns beside the set, from those with the set's columns, with each other, and with what the set's
-    /// offsets leave of the measurement.
+    /// Products of residual columns, from the products `cross` of the columns with the set's columns, `own` with each other,
+    /// and `right` with the measurement less the set's offsets.
     fn of_products(
         &self,
         cross: &DMatrix<f64>,
@@ -80,7 +80,7 @@ impl<'a> Around<'a> {
         }
     }
 
-    /// Products of columns that are no variant's beside the set: with each other, and with the measurement.
+    /// Products of the residual columns of further columns: with each other, and with the residual of the measurement.
     pub fn products(&self, columns: &[Whitened]) -> (DMatrix<f64>, DVector<f64>) {
         let objective = self.objective;
         let m = columns.len();
@@ -121,7 +121,7 @@ impl<'a> Around<'a> {
         let Some(block) = block.cholesky() else {
             return variants.iter().map(|&v| (v, f64::NEG_INFINITY)).collect();
         };
-        // Coefficients of the set's columns in the removed offsets, which return to the measurement.
+        // Products of the set's columns with the removed offsets, which return to the measurement.
         let index = &self.base.index;
         let returned = offsets.iter().fold(DVector::zeros(index.len()), |sum, &o| {
             let row = objective.gram(o);

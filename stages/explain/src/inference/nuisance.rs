@@ -142,7 +142,7 @@ fn of_bodies(problem: &Problem, fit: &Fit, scale: f64, all: &mut Vec<Nuisance>) 
     }
 }
 
-/// What usual errors of its bodies change in the effort of another simulation, whose bodies are not known: a share of each
+/// Usual errors of another simulation's effort, whose bodies are not known: a share of each
 /// joint's effort, and of the part that is proportional to its acceleration.
 fn of_another_simulation(problem: &Problem, all: &mut Vec<Nuisance>) {
     let n = problem.joints;

@@ -233,8 +233,8 @@ impl<'a> Objective<'a> {
         })
     }
 
-    /// Gain in value by adding a variant to a set \[nats\], from the products of its columns beside the set: the offset
-    /// first, if it has one.
+    /// Gain in value by adding a variant to a set \[nats\], from the products of its residual columns: `own` with each
+    /// other, `right` with the residual of the measurement. The offset comes first, if it has one.
     pub(super) fn gain(
         variant: &Variant,
         has_offset: bool,

@@ -31,7 +31,8 @@ const LEAST_GAIN: f64 = 0.2;
 /// Prior standard deviation of a time \[s\]. Resolution: of the scan that proposes it.
 const TIME_S: f64 = 0.1;
 
-/// Hypotheses at shapes that score better than those of the objective beside a set, or in the place of one of its effects.
+/// Hypotheses at improved shapes: better than those of the objective as an addition to a set, or as a replacement of one of
+/// its effects.
 pub fn sharpened(
     problem: &Problem,
     fit: &Fit,
