@@ -13,8 +13,8 @@ use crate::physics::act::{act_over, over_tracks, recorded};
 use crate::physics::active::Active;
 use crate::physics::carrier::{Carrier, is_on_carrier};
 
-/// Adds the effort of an effect on bodies to efforts over all tracks. `rigid` is the twin's effort, `carrier` the robot with
-/// the bodies that were found, if there are any.
+/// Adds the effort of an effect on bodies to efforts over all tracks. `rigid` is the twin's effort, `carrier` the robots
+/// with the bodies and the tilt that were found, if there are any.
 pub fn add(
     problem: &Problem,
     active: &Active,
@@ -24,17 +24,21 @@ pub fn add(
 ) {
     let hypothesis = active.hypothesis;
     let carrier = carrier.filter(|_| is_on_carrier(active));
-    let mut term = active.term(carrier.map_or(&problem.model, |carrier| &carrier.model));
+    let mut term = active.term(carrier.map_or(&problem.model, |carrier| carrier.robot(active)));
     let of_units = (carrier.is_none()).then(|| in_units(problem, &*term));
     if let Some((unit, factors)) = of_units.flatten() {
         add_units(&units(problem, unit), &factors, into);
-    } else if hypothesis.is_body() && !hypothesis.lasts() && problem.rows <= MOST_ROWS {
+    } else if carrier.is_none()
+        && hypothesis.is_body()
+        && !hypothesis.lasts()
+        && problem.rows <= MOST_ROWS
+    {
         add_for_a_while(problem, &*term, hypothesis.place.link, into);
     } else {
         if problem.rows <= MOST_ROWS && hypothesis.has_rotor() {
             term.expand(problem.expansion(hypothesis.place.joint));
         }
-        if problem.rows <= MOST_ROWS && is_on_carrier(active) {
+        if problem.rows <= MOST_ROWS && hypothesis.effect.traits.bends {
             term.know_recorded(match carrier {
                 Some(carrier) => carrier.recorded(problem),
                 None => problem

@@ -66,7 +66,9 @@ impl Context<'_> {
         let robot = |active: &Active| carrier.filter(|_| is_on_carrier(active));
         let terms = in_order(&fit.actives)
             .into_iter()
-            .map(|active| active.term(robot(active).map_or(&problem.model, |robot| &robot.model)))
+            .map(|active| {
+                active.term(robot(active).map_or(&problem.model, |carrier| carrier.robot(active)))
+            })
             .collect();
         let mut physics = Physics::new(terms, self.unit_nm.len());
         let mut effort = track.run(&mut physics, &track.rigid);
