@@ -46,6 +46,10 @@ use variants::{Given, Variant};
 /// Most rounds of linearising, estimating the noise and searching. Resolution: bounds the computing time.
 const ROUNDS: usize = 10;
 
+/// Smallest share of a predicted gain that a step must have. Chosen: a half, between the quarter and the three quarters of
+/// Nocedal and Wright, algorithm 4.1.
+const TRUSTED: f64 = 0.5;
+
 /// An explanation and what is known of it.
 #[derive(Debug)]
 pub struct Inferred {
@@ -98,13 +102,17 @@ pub fn infer(
         let (found, is_partial) =
             first_that_bends(&objective, &own, search::search(&objective, own.clone()));
         let found = nested::simplest(&objective, found);
-        let gained = objective.score(&found) - objective.score(&own);
-        let solution = without_idle(
+        let here = space.evidence(&measured) + objective.score(&own);
+        let step = Step {
             problem,
-            &space,
-            &state,
-            refined(problem, &space, &objective, &found),
-        );
+            space: &space,
+            state: &state,
+            objective: &objective,
+            here,
+        };
+        let (found, solution, is_shortened) = step.taken(&own, found);
+        let gained = objective.score(&found) - objective.score(&own);
+        let is_partial = is_partial || is_shortened && gained > 0.0;
         let effects: Vec<Hypothesis> = solution.fit.actives.iter().map(|a| a.hypothesis).collect();
         round += 1;
         let is_settled = round > 1 && !is_partial && gained < AS_LIKELY;
@@ -155,6 +163,65 @@ fn first_that_bends(objective: &Objective<'_>, own: &Set, found: Set) -> (Set, b
     (found.into_iter().filter(kept).collect(), true)
 }
 
+/// A step from one explanation to the next. The objective is that of tangents, so the gain that it predicts is compared with
+/// the gain after refinement, and where that is less than half of it, fewer effects are added (a trust region; Nocedal and
+/// Wright, *Numerical Optimization*, 2006, chapter 4).
+struct Step<'a> {
+    problem: &'a Problem,
+    space: &'a Space,
+    state: &'a State<'a>,
+    objective: &'a Objective<'a>,
+    /// Value of the explanation that the step begins at \[nats\].
+    here: f64,
+}
+
+impl Step<'_> {
+    /// The set that is reached, its refined numbers, and whether it lacks some of what was found.
+    fn taken(&self, own: &Set, found: Set) -> (Set, Solution, bool) {
+        let score = |set: &Set| self.objective.score(set);
+        let mut added: Vec<(f64, usize)> = (found.iter().filter(|v| !own.contains(v)))
+            .map(|&v| (score(&search::without(&found, v)), v))
+            .collect();
+        added.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (mut set, mut first, mut count) = (found, 0, added.len());
+        loop {
+            let (solution, value) = self.refined(&set);
+            let predicted = score(&set) - score(own);
+            let gained = value - self.here;
+            let is_shortened = first > 0 || count < added.len();
+            if count == 0 || gained >= TRUSTED * predicted {
+                return (set, solution, is_shortened);
+            }
+            if count > 1 {
+                count /= 2;
+            } else {
+                first += 1;
+                count = usize::from(first < added.len());
+            }
+            set = own.clone();
+            set.extend(added[first..].iter().take(count).map(|(_, v)| *v));
+            set.sort_unstable();
+        }
+    }
+
+    /// The refined numbers of a set, without the effects that they leave nothing to do, and its value.
+    fn refined(&self, set: &Set) -> (Solution, f64) {
+        let (problem, space) = (self.problem, self.space);
+        let mut solution = refined(problem, space, self.objective, set);
+        loop {
+            let given = variants::of_fit(problem, &solution.fit, &self.state.efforts);
+            let measured = variants::measured(problem, &solution.fit);
+            let own = Objective::new(space, &measured, given);
+            let all: Set = (0..own.variants.len()).collect();
+            let kept = search::without_idle(&own, all.clone());
+            if kept == all {
+                return (solution, space.evidence(&measured) + own.score(&all));
+            }
+            solution = refined(problem, space, &own, &kept);
+        }
+    }
+}
+
 /// The numbers of a set, refined.
 fn refined(problem: &Problem, space: &Space, objective: &Objective<'_>, set: &Set) -> Solution {
     let factors = objective.factors(set);
@@ -166,25 +233,6 @@ fn refined(problem: &Problem, space: &Space, objective: &Objective<'_>, set: &Se
     let fit = Fit::new(problem, actives.collect());
     let deviations: Vec<f64> = own.flat_map(Variant::all_deviations).collect();
     refine::refine(problem, space, fit, &deviations)
-}
-
-/// A solution without the effects that its refined numbers leave nothing to do.
-fn without_idle(
-    problem: &Problem,
-    space: &Space,
-    state: &State<'_>,
-    mut solution: Solution,
-) -> Solution {
-    loop {
-        let given = variants::of_fit(problem, &solution.fit, &state.efforts);
-        let own = Objective::new(space, &variants::measured(problem, &solution.fit), given);
-        let all: Set = (0..own.variants.len()).collect();
-        let kept = search::without_idle(&own, all.clone());
-        if kept == all {
-            return solution;
-        }
-        solution = refined(problem, space, &own, &kept);
-    }
 }
 
 /// The columns of all effects that are linear in their numbers, scaled by their prior standard deviations.

@@ -26,6 +26,8 @@ const FRICTION_SHARE: f64 = 0.05;
 const STAMP_S: f64 = 0.001;
 /// Usual difference between the stamps of effort and position that all joints share \[s\]. Chosen: current controllers and filters of drives take some milliseconds.
 const COMMON_STAMP_S: f64 = 0.004;
+/// Usual width of a filter that the efforts of all joints pass and positions do not, or the reverse \[s\]. Chosen: a low-pass filter of 20 Hz.
+const COMMON_WIDTH_S: f64 = 0.008;
 
 /// A nuisance: its effort at one standard deviation.
 #[derive(Debug)]
@@ -75,29 +77,51 @@ pub fn of(
     } else {
         of_another_simulation(problem, &mut all);
     }
-    let mut common = vec![0.0; problem.joints * problem.rows];
+    let none = || vec![0.0; problem.joints * problem.rows];
+    let (mut late, mut wide) = (none(), none());
+    let sample_s = sample_s(problem);
     for (joint, size) in sizes.iter().enumerate() {
         of_curves(problem, fit, joint, *size, laws, &mut all);
-        let (shift_s, own) = of_stamps(problem, fit, joint);
-        let values = own
-            .column
-            .values
-            .iter()
-            .map(|x| x * COMMON_STAMP_S / shift_s);
-        for (common, x) in common[problem.joint_rows(joint)].iter_mut().zip(values) {
-            *common = x;
+        let own = [
+            of_stamps(problem, fit, joint),
+            of_bandwidth(problem, fit, joint),
+        ];
+        let shares = [
+            COMMON_STAMP_S / stamp_s(sample_s),
+            (COMMON_WIDTH_S / sample_s).powi(2),
+        ];
+        let rows = problem.joint_rows(joint);
+        for ((common, own), share) in [&mut late, &mut wide].into_iter().zip(&own).zip(shares) {
+            for (common, x) in common[rows.clone()].iter_mut().zip(&own.column.values) {
+                *common = share * x;
+            }
         }
-        all.push(own);
-        all.push(of_bandwidth(problem, fit, joint));
+        all.extend(own);
     }
-    all.push(Nuisance {
+    all.extend([late, wide].map(|values| Nuisance {
         column: Column {
             joint: None,
-            values: common,
+            values,
         },
         source: Source::Stamp,
-    });
+    }));
     all
+}
+
+/// Mean time between samples \[s\].
+fn sample_s(problem: &Problem) -> f64 {
+    let times = problem.tracks.iter().map(|track| &track.track.time_s);
+    let (mut span_s, mut count) = (0.0, 0);
+    for time in times.filter(|time| time.len() > 1) {
+        span_s += time[time.len() - 1] - time[0];
+        count += time.len() - 1;
+    }
+    (span_s / count.max(1) as f64).max(1e-6)
+}
+
+/// Usual difference between the stamps of effort and position of one joint \[s\].
+fn stamp_s(sample_s: f64) -> f64 {
+    STAMP_S.max(0.5 * sample_s.min(0.01))
 }
 
 /// The effect that changes all inertial parameters of a link.
@@ -263,21 +287,10 @@ pub fn late(problem: &Problem, fit: &Fit, joint: usize) -> Column {
     })
 }
 
-/// The joint's effort shifted in time, and by how much.
-fn of_stamps(problem: &Problem, fit: &Fit, joint: usize) -> (f64, Nuisance) {
-    let mut shift_s = STAMP_S;
-    for track in &problem.tracks {
-        let time = &track.track.time_s;
-        if time.len() > 1 {
-            let mean = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
-            shift_s = shift_s.max(0.5 * mean.min(0.01));
-        }
+/// The joint's effort shifted in time.
+fn of_stamps(problem: &Problem, fit: &Fit, joint: usize) -> Nuisance {
+    Nuisance {
+        column: late(problem, fit, joint).times(stamp_s(sample_s(problem))),
+        source: Source::Stamp,
     }
-    (
-        shift_s,
-        Nuisance {
-            column: late(problem, fit, joint).times(shift_s),
-            source: Source::Stamp,
-        },
-    )
 }

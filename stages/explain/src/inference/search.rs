@@ -27,12 +27,12 @@ const LEAST_GAIN: f64 = 1e-6;
 pub fn search(objective: &Objective<'_>, start: Set) -> Set {
     let all: Vec<usize> = (0..objective.variants.len()).collect();
     let mut best = start.clone();
-    let flooded = flooded(objective, &start).into_iter();
-    for set in flooded.chain([start]) {
-        let grown = warm(objective, set, &all);
-        if objective.score(&grown) > objective.score(&best) {
-            best = grown;
-        }
+    let coarse = coarse(objective, &start);
+    for set in [coarse, start] {
+        best = better(objective, best, warm(objective, set, &all));
+    }
+    for set in flooded(objective, &best) {
+        best = better(objective, best, warm(objective, set, &all));
     }
     let mut beam = vec![best.clone()];
     let mut done = BTreeSet::new();
@@ -68,16 +68,28 @@ pub fn search(objective: &Objective<'_>, start: Set) -> Set {
     best
 }
 
-/// Further sets to begin with. Effects that are added one by one can imitate others together. So one of these sets begins
-/// with the effects that all joints feel, the others with one effect at every joint, less those that gain nothing.
-fn flooded(objective: &Objective<'_>, start: &Set) -> Vec<Set> {
-    let every = 0..objective.variants.len();
+fn better(objective: &Objective<'_>, a: Set, b: Set) -> Set {
+    if objective.score(&b) > objective.score(&a) {
+        b
+    } else {
+        a
+    }
+}
+
+/// A set with the best of the effects that all joints feel and the ordinary ones.
+fn coarse(objective: &Objective<'_>, start: &Set) -> Set {
     let common = |v: &usize| {
         let hypothesis = objective.variants[*v].hypothesis;
         hypothesis.only_joint().is_none() || hypothesis.is_ordinary()
     };
-    let first: Vec<usize> = every.clone().filter(common).collect();
-    let coarse = warm(objective, start.clone(), &first);
+    let first: Vec<usize> = (0..objective.variants.len()).filter(common).collect();
+    warm(objective, start.clone(), &first)
+}
+
+/// Sets with one effect of the same kind at every joint, less those that gain nothing: effects that are added one by one can
+/// imitate others together.
+fn flooded(objective: &Objective<'_>, start: &Set) -> Vec<Set> {
+    let every = 0..objective.variants.len();
     let mut kinds: Vec<&str> = Vec::new();
     for v in every.clone() {
         let hypothesis = objective.variants[v].hypothesis;
@@ -104,8 +116,11 @@ fn flooded(objective: &Objective<'_>, start: &Set) -> Vec<Set> {
     };
     let mut floods = parallel::map(&kinds, of_kind);
     floods.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let best = floods.into_iter().take(FLOODS).map(|(_, set)| set);
-    std::iter::once(coarse).chain(best).collect()
+    floods
+        .into_iter()
+        .take(FLOODS)
+        .map(|(_, set)| set)
+        .collect()
 }
 
 /// The place of an effect: what is added at the same time in a warm start acts at different ones.
@@ -130,7 +145,8 @@ fn with(set: &Set, variant: usize) -> Set {
     set
 }
 
-fn without(set: &Set, variant: usize) -> Set {
+/// A set without one of its variants.
+pub fn without(set: &Set, variant: usize) -> Set {
     set.iter().copied().filter(|v| *v != variant).collect()
 }
 

@@ -18,13 +18,13 @@ use super::remainder;
 use super::rows::Rows;
 use super::space::Space;
 use super::temper;
-use super::variants::{self, Given, Variant};
+use super::variants::{self, Given};
 
 /// Candidate scales of the errors of bodies, in usual errors. Resolution: of an estimate that some ten bodies allow, and that the heavy ones
 /// decide: light ones may be off by more.
 const BODY_SCALES: [f64; 3] = [0.55, 1.0, 1.8];
 /// Candidate scales of the errors of laws, in usual errors. Resolution: as of bodies.
-const LAW_SCALES: [f64; 4] = [0.1, 0.3, 0.55, 1.0];
+const LAW_SCALES: [f64; 2] = [0.55, 1.0];
 /// Weight of the usual errors against an estimate: twice the squared logarithm of the scale is taken off \[nats\].
 /// Chosen: a normal prior on the logarithm with a standard deviation of one half.
 const SCALE_WEIGHT: f64 = 2.0;
@@ -106,15 +106,12 @@ impl<'a> State<'a> {
             let own = |column: &Column| column.of_joint(joint, problem.rows).map(|x| rows.pick(x));
             let mut columns: Vec<Vec<f64>> =
                 nuisances.iter().filter_map(|n| own(&n.column)).collect();
-            let counts = |variant: &Variant| {
-                let is_linear = variant.hypothesis.is_linear() && variant.curve.is_none();
-                is_first && is_linear
-                    || fit
-                        .actives
-                        .iter()
-                        .any(|active| active.hypothesis == variant.hypothesis)
+            let (of_fit, others) = given.split_at(fit.actives.len());
+            let is_linear = |given: &&Given| {
+                given.variant.hypothesis.is_linear() && given.variant.curve.is_none()
             };
-            for given in given.iter().filter(|given| counts(&given.variant)) {
+            let others = others.iter().filter(|given| is_first && is_linear(given));
+            for given in of_fit.iter().chain(others) {
                 for (column, deviation) in given.factors.iter().zip(&given.variant.deviations) {
                     let scaled = own(column).map(|x| x.iter().map(|x| x * deviation).collect());
                     columns.extend(scaled);
@@ -123,7 +120,10 @@ impl<'a> State<'a> {
             let matrix = DMatrix::from_fn(rows.len(), columns.len(), |k, c| columns[c][k]);
             let white = problem.white_noise[joint];
             let most_slow = if is_first { white } else { f64::INFINITY };
-            if let Some(y) = own(measured) {
+            if let Some(mut y) = own(measured) {
+                for alone in of_fit.iter().filter_map(|given| own(given.alone.as_ref()?)) {
+                    y.iter_mut().zip(alone).for_each(|(y, alone)| *y -= alone);
+                }
                 let data = noise::Data {
                     rows,
                     y: &y,

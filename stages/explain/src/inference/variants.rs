@@ -215,12 +215,17 @@ pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[Magnitude]) -> Vec<Given> {
         let most_effort = sizes.iter().map(|size| size.rms).fold(0.0, f64::max);
         let alone = (largest > 1e-6 * most_effort).then_some(alone);
         let factors: Vec<Arc<Column>> = factors.into_iter().map(|(_, column)| column).collect();
+        // At its best shape an effect is as probable beforehand as at any other of its grid.
+        let count = match active.hypothesis.time_kind() {
+            TimeKind::Always => shapes(problem, active.hypothesis).len(),
+            _ => 1,
+        };
         let mut given = given(
             problem,
             active.hypothesis,
             active.shape(),
             (alone, factors),
-            1,
+            count,
             sizes,
         );
         if let Some(table) = &active.curve {
