@@ -183,7 +183,7 @@ fn what_breaks_the_rules_is_told() {
     );
     assert_eq!(
         broken(|state| state.effort.push(1.0)),
-        "`effort` has 3 entries for 2 names (a, b): it is unknown which belongs to which. Make the driver fill all arrays to the same length"
+        "`effort` has 3 entries for 2 names (a, b): it is unknown which belongs to which. Make the driver send a value for each name, or only the names that it has values for, and record again"
     );
 
     let with = |at: usize, byte| {

@@ -203,10 +203,10 @@ fn arrays_that_do_not_fit_are_counted_with_their_lengths() {
     let text = info.to_string();
     for line in [
         "  no usable message names a joint\n",
-        "  1200 messages cannot be used: `position` has 6 entries for 8 names (j0, j1, j2, j3, j4, j5, j6, j7): it is unknown which belongs to which. Make the driver fill all arrays to the same length\n",
+        "  1200 messages cannot be used: `position` has 6 entries for 8 names (j0, j1, j2, j3, j4, j5, j6, j7): it is unknown which belongs to which. Make the driver send a value for each name, or only the names that it has values for, and record again\n",
         "  1 message cannot be used: `name` is empty, but `position` has 6 entries: their joints are unknown\n",
-        "  1 message cannot be used: `position` has 6 entries for 1 name (j0): it is unknown which belongs to which. Make the driver fill all arrays to the same length\n",
-        "  1 message cannot be used: `position` has 6 entries for 2 names (j0, j1): it is unknown which belongs to which. Make the driver fill all arrays to the same length\n",
+        "  1 message cannot be used: `position` has 6 entries for 1 name (j0): it is unknown which belongs to which. Make the driver send a value for each name, or only the names that it has values for, and record again\n",
+        "  1 message cannot be used: `position` has 6 entries for 2 names (j0, j1): it is unknown which belongs to which. Make the driver send a value for each name, or only the names that it has values for, and record again\n",
         "  2 messages cannot be used for other reasons\n",
     ] {
         assert!(text.contains(line), "{text}");

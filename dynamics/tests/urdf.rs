@@ -269,7 +269,7 @@ fn each_fault_is_refused_by_name_and_line() {
         (
             "<link name=\"base\">",
             "<link name=\"world\"/><link name=\"base\">",
-            "2 links hang on no joint, a robot has one root: `world`, `base`",
+            "2 links have no parent joint: `world`, `base`. A robot has one root: connect them to one link by fixed joints, or use one URDF for each arm",
         ),
         (
             "<parent link=\"base\"/>",

@@ -73,7 +73,7 @@ impl fmt::Display for Times {
         let starts = starts.join(", ");
         write!(
             f,
-            " between {first_s:.3} s and {last_s:.3} s (the first at {starts} s)"
+            " between {first_s:.3} s and {last_s:.3} s (first at {starts} s)"
         )
     }
 }
@@ -343,11 +343,11 @@ mod tests {
             (times(12, 1, &[3.0]), "12 messages from 3.000 s to 9.000 s"),
             (
                 times(12, 12, &[3.0, 4.0, 5.0]),
-                "12 single messages between 3.000 s and 9.000 s (the first at 3.000, 4.000, 5.000 s)",
+                "12 single messages between 3.000 s and 9.000 s (first at 3.000, 4.000, 5.000 s)",
             ),
             (
                 times(12, 2, &[3.0, 8.0]),
-                "12 messages between 3.000 s and 9.000 s (the first at 3.000, 8.000 s)",
+                "12 messages between 3.000 s and 9.000 s (first at 3.000, 8.000 s)",
             ),
         ] {
             assert_eq!(times.to_string(), words);

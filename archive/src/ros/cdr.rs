@@ -55,7 +55,7 @@ pub enum DecodeError {
     },
     /// An array that does not fit the names.
     #[error(
-        "`{array}` has {} for {} ({}): it is unknown which belongs to which. Make the driver fill all arrays to the same length",
+        "`{array}` has {} for {} ({}): it is unknown which belongs to which. Make the driver send a value for each name, or only the names that it has values for, and record again",
         counted(*len, ENTRY),
         counted(*names, NAME),
         listed(first_names, *names)

@@ -150,7 +150,7 @@ mod tests {
         assert_eq!(
             words(&message),
             Err(
-                "`interface_values` has 0 entries for 1 name (a): it is unknown which belongs to which. Make the driver fill all arrays to the same length"
+                "`interface_values` has 0 entries for 1 name (a): it is unknown which belongs to which. Make the driver send a value for each name, or only the names that it has values for, and record again"
                     .to_owned()
             )
         );
@@ -160,7 +160,7 @@ mod tests {
         assert_eq!(
             words(&message),
             Err(
-                "`values` has 2 entries for 1 name (position): it is unknown which belongs to which. Make the driver fill all arrays to the same length".to_owned()
+                "`values` has 2 entries for 1 name (position): it is unknown which belongs to which. Make the driver send a value for each name, or only the names that it has values for, and record again".to_owned()
             )
         );
     }

@@ -108,9 +108,9 @@ impl Finding {
                 f.write_str(match (is_replaced, has_log_times) {
                     (true, _) => "The time of recording is used instead. Let the driver publish stamps of full resolution",
                     (_, true) => {
-                        "Joint speeds cannot be computed from them. The time of recording is not used instead, because it includes \
-                         delays that such coarse stamps cannot reveal. Let the driver publish stamps of full resolution, and record \
-                         again"
+                        "Joint speeds cannot be computed from them. The time of recording is no substitute: it includes delays, and \
+                         stamps as coarse as these cannot show how large they are. Let the driver publish stamps of full \
+                         resolution, and record again"
                     }
                     _ => {
                         "Joint speeds cannot be computed from them, and there is no other time. Record stamps of full resolution"
@@ -167,10 +167,10 @@ impl Finding {
                 }
                 f.write_str(
                     ". `replay` continues after a jump. Commands that learn, such as `init` and `explain`, leave out what follows \
-                     until the stamps have caught up",
+                     a jump, until the stamps pass the last one before it",
                 )?;
                 if *refused > 0 {
-                    write!(f, ", here {refused} messages")?;
+                    write!(f, ": {refused} messages of this recording")?;
                 }
                 f.write_str(
                     ". If a playback was looped, record without looping; if the clock was set back, synchronise it before \
@@ -204,14 +204,15 @@ impl Finding {
                 of_messages,
                 usual,
             } => {
-                let examples = [Some(*example), subnormal.filter(|_| !example.is_subnormal())];
-                let examples = examples.into_iter().flatten().map(magnitude);
+                let second = subnormal.filter(|_| !example.is_subnormal());
+                let examples = [Some(*example), second].into_iter().flatten();
                 write!(
                     f,
                     "the {field} of {joint} is implausible in {times}, for example {}. 90 % of its values are below {usual} in \
-                     magnitude. {} left out for all joints. The driver probably publishes \
+                     magnitude{}. {} left out for all joints; the others are used. The driver probably publishes \
                      uninitialised memory or an error value: check that it fills `{field}` of {joint} in every message",
-                    examples.collect::<Vec<_>>().join(" and "),
+                    examples.map(magnitude).collect::<Vec<_>>().join(" and "),
+                    subnormal.map_or("", |_| ", and no sensor resolves such small ones"),
                     match times.messages {
                         1 => format!("This one of {of_messages} messages is"),
                         count => format!("These {count} of {of_messages} messages are"),
@@ -280,7 +281,8 @@ fn publishers(
     write!(f, ". Used: {}. Not used: {}", list(used), list(ignored))?;
     if ignored.iter().any(|publisher| !publisher.measures_effort()) {
         f.write_str(
-            ". Remap or stop the publisher that sends no effort; this result is not affected",
+            ". The results here do not depend on the publisher that sends no effort. Remap or stop it, because other listeners \
+             may take its messages for the arm's",
         )?;
     }
     Ok(())

@@ -101,8 +101,8 @@ fn not_positive_definite(names: &str, least: f64, rows: Option<[f64; 6]>) -> Str
             .map(|(name, value)| format!("{name}=\"{value}\""))
             .collect();
         format!(
-            " Its attributes {} look like the first two rows of a 3x3 matrix. Then iyy holds ixy again, iyz holds iyy, izz holds \
-             iyz, and izz itself is missing.",
+            " Its attributes {} look like the first two rows of a 3x3 matrix (xx xy xz yx yy yz). \
+             Then the values of iyy and iyz are one place too far, and that of izz is missing: take it from the data sheet.",
             pairs.join(" ")
         )
     });
@@ -119,7 +119,7 @@ fn triangle(inertia: &str, [a, b, c]: &[f64; 3], slip: Option<(&'static str, f64
         || "Correct its <inertia>.".to_owned(),
         |(name, value, better)| {
             format!(
-                "{name}=\"{value}\" may be a decimal slip: {name}=\"{better}\" would be valid. Check the data sheet."
+                "{name}=\"{value}\" may be a decimal slip: {name}=\"{better}\" would be possible. Check the data sheet."
             )
         },
     );
@@ -175,9 +175,10 @@ fn inertia_unit(count: usize, unit: &str, masses_in_g: bool) -> String {
 
 /// The sentence on the numbers that the twin uses.
 fn on_the_substitute(finding: &BodyFinding) -> String {
-    let again = "Correct the file and run the command again.";
+    let again =
+        "Until the file is correct, results are provisional: correct it and run the command again.";
     if let BodyFault::CentreFar { is_in_mm: true, .. } = finding.fault {
-        return " In this run the twin reads it as mm.".to_owned();
+        return " The twin reads it as mm.".to_owned();
     }
     match finding.substitutes.as_slice() {
         [] => match finding.fault {
@@ -192,16 +193,16 @@ fn on_the_substitute(finding: &BodyFinding) -> String {
                 ..
             },
         ] => format!(
-            " In this run the twin uses the inertia of a uniform cylinder of the same mass instead (principal moments {} kg m²). \
+            " The twin uses the inertia of a uniform cylinder of the same mass instead (principal moments {} kg m²). \
              {again}",
             figures(moments)
         ),
         [first, ..] if first.cylinder_kgm2.is_some() => {
             format!(
-                " In this run the twin uses the inertias of uniform cylinders of the same masses instead. {again}"
+                " The twin uses the inertias of uniform cylinders of the same masses instead. {again}"
             )
         }
-        _ => " In this run the twin converts them.".to_owned(),
+        _ => " The twin converts them.".to_owned(),
     }
 }
 

@@ -137,7 +137,7 @@ pub fn losses(input: &Input) -> Vec<String> {
         let lost = lost.count();
         if lost > 0 {
             notes.push(format!(
-                "{}: the predictions of the {lost} rows that were left out are NaN.",
+                "{}: the predictions of the {lost} rows that were left out are NaN in the table of predictions.",
                 recording.name
             ));
         }

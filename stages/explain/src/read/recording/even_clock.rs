@@ -43,8 +43,8 @@ impl EvenClock {
             "stamps"
         };
         format!(
-            "{recording}: its {times} differ by {:.2} ms (RMS) from an even clock of {:.3} ms. The positions were sampled evenly, \
-             so they were put back on that clock.",
+            "{recording}: its {times} differ by {:.2} ms (RMS) from an even clock of {:.3} ms. The positions are smoother over \
+             that clock, so the samples are put on it.",
             1e3 * self.off_s,
             1e3 * self.step_s
         )
