@@ -274,21 +274,25 @@ fn tangents(problem: &Problem, fit: &Fit, efforts: &[Magnitude]) -> (Vec<Column>
     (columns, measured)
 }
 
-/// Features of the motion that predict what a fit leaves in recordings that it was not fitted on.
+/// Features of the motion that predict what a fit leaves in pieces of recordings that it was not fitted on.
 fn remaining(
     problem: &Problem,
     space: &Space,
     fit: &Fit,
     efforts: &[Magnitude],
 ) -> Vec<remainder::Predicted> {
-    let recordings = problem.tracks.len();
+    let pieces = rows::pieces(problem);
     let (columns, measured) = tangents(problem, fit, efforts);
-    let Some(left_out) = LeftOut::new(space, &columns, &measured, recordings) else {
+    let Some(left_out) = LeftOut::new(space, &columns, &measured, pieces) else {
         return Vec::new();
     };
-    let of = |joint: usize| (0..recordings).map(move |r| (joint, r));
+    let of = |joint: usize| (0..pieces).map(move |piece| (joint, piece));
     let residuals: Vec<Vec<DVector<f64>>> = (0..problem.joints)
-        .map(|joint| of(joint).map(|(j, r)| left_out.residual(j, r)).collect())
+        .map(|joint| {
+            of(joint)
+                .map(|(j, piece)| left_out.residual(j, piece))
+                .collect()
+        })
         .collect();
     remainder::predicted(space, &residuals, &remainder::features(problem, fit))
 }

@@ -250,6 +250,7 @@ mod tests {
         Rows {
             row: (0..count).collect(),
             recording: (0..count).map(|k| k * 2 / count).collect(),
+            piece: (0..count).map(|k| k * 2 / count).collect(),
             time_s: (0..count)
                 .map(|k| 0.06 * (k % (count / 2)) as f64)
                 .collect(),

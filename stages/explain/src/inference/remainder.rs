@@ -97,13 +97,13 @@ pub fn predicted(
     residuals: &[Vec<DVector<f64>>],
     features: &[Feature],
 ) -> Vec<Predicted> {
-    let recordings = residuals.first().map_or(0, Vec::len);
-    if recordings < 2 {
+    let pieces = residuals.first().map_or(0, Vec::len);
+    if pieces < 2 {
         return Vec::new();
     }
     let compared: Vec<Compared> = features
         .iter()
-        .map(|feature| Compared::of(space, feature, recordings))
+        .map(|feature| Compared::of(space, feature, pieces))
         .collect();
     let squares: Vec<f64> = residuals
         .iter()
@@ -166,11 +166,11 @@ pub fn predicted(
 }
 
 impl Compared {
-    fn of(space: &Space, feature: &Feature, recordings: usize) -> Self {
+    fn of(space: &Space, feature: &Feature, pieces: usize) -> Self {
         let mut whitened: Vec<Vec<Vec<f64>>> = feature
             .columns
             .iter()
-            .map(|column| space.whitened_by_recording(feature.joint, column, recordings))
+            .map(|column| space.whitened_by_piece(feature.joint, column, pieces))
             .collect();
         for column in &mut whitened {
             let rows: usize = column.iter().map(Vec::len).sum();
@@ -178,7 +178,7 @@ impl Compared {
             let scale = (rows as f64 / square.max(1e-12)).sqrt();
             column.iter_mut().flatten().for_each(|x| *x *= scale);
         }
-        let columns: Vec<DMatrix<f64>> = (0..recordings)
+        let columns: Vec<DMatrix<f64>> = (0..pieces)
             .map(|r| {
                 let rows = whitened.first().map_or(0, |column| column[r].len());
                 DMatrix::from_fn(rows, whitened.len(), |k, c| whitened[c][r][k])

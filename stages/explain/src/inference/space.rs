@@ -168,19 +168,14 @@ impl Space {
         }
     }
 
-    /// Whitens a joint's part of a signal, by recording.
-    pub fn whitened_by_recording(
-        &self,
-        joint: usize,
-        values: &[f64],
-        recordings: usize,
-    ) -> Vec<Vec<f64>> {
+    /// Whitens a joint's part of a signal, by piece of a recording.
+    pub fn whitened_by_piece(&self, joint: usize, values: &[f64], pieces: usize) -> Vec<Vec<f64>> {
         let rows = &self.rows[joint];
         let mut picked = rows.pick(values);
         self.filters[joint].apply(&mut picked);
-        let mut all = vec![Vec::new(); recordings];
-        for (value, recording) in picked.into_iter().zip(&rows.recording) {
-            all[*recording].push(value);
+        let mut all = vec![Vec::new(); pieces];
+        for (value, piece) in picked.into_iter().zip(&rows.piece) {
+            all[*piece].push(value);
         }
         all
     }

@@ -15,7 +15,7 @@ use super::nuisance::{self, Nuisance, Size};
 use super::objective::{Objective, Set};
 use super::prior::Magnitude;
 use super::remainder;
-use super::rows::Rows;
+use super::rows::{Rows, pieces};
 use super::space::Space;
 use super::temper;
 use super::variants::{self, Given};
@@ -177,14 +177,11 @@ impl<'a> State<'a> {
         columns: &[Column],
         measured: &Column,
     ) {
-        let recordings = self.problem.tracks.len();
-        if recordings < 2 {
-            return;
-        }
+        let pieces = pieces(self.problem);
         let space = self.space(nuisances);
         let features = remainder::features(self.problem, fit);
-        if let Some(left_out) = LeftOut::new(&space, columns, measured, recordings) {
-            self.tempers = temper::tempers(&space, &left_out, &features, recordings, &self.tempers);
+        if let Some(left_out) = LeftOut::new(&space, columns, measured, pieces) {
+            self.tempers = temper::tempers(&space, &left_out, &features, pieces, &self.tempers);
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! No real arm is as the model says, and thousands of rows then find evidence for anything. The likelihood of each joint is
 //! raised to a power below one instead ("coarsened"; Miller and Dunson, "Robust Bayesian Inference via Coarsening", JASA
-//! 2019): one over the dispersion of the residual in recordings that are left out, which is Pearson's statistic over its
+//! 2019): one over the dispersion of the residual in pieces of recordings that are left out, which is Pearson's statistic over its
 //! degrees of freedom (`McCullagh` and Nelder, *Generalized Linear Models*, 1989, section 4.5). It counts only
 //! the functions of the motion in which effects differ, because everything else is noise.
 
@@ -22,19 +22,19 @@ pub fn tempers(
     space: &Space,
     left_out: &LeftOut<'_>,
     features: &[Feature],
-    recordings: usize,
+    pieces: usize,
     weights: &[f64],
 ) -> Vec<f64> {
     let of = |(joint, weight): (usize, &f64)| {
         let (mut square, mut freedom) = (0.0, 0.0);
         let own: Vec<Vec<Vec<f64>>> = (features.iter().filter(|f| f.joint == joint))
             .flat_map(|f| &f.columns)
-            .map(|column| space.whitened_by_recording(joint, column, recordings))
+            .map(|column| space.whitened_by_piece(joint, column, pieces))
             .collect();
-        for recording in 0..recordings {
-            let residual = left_out.residual(joint, recording);
-            let features = DMatrix::from_fn(residual.len(), own.len(), |k, c| own[c][recording][k]);
-            let covariance = left_out.covariance(joint, recording, &features);
+        for piece in 0..pieces {
+            let residual = left_out.residual(joint, piece);
+            let features = DMatrix::from_fn(residual.len(), own.len(), |k, c| own[c][piece][k]);
+            let covariance = left_out.covariance(joint, piece, &features);
             let eigen = SymmetricEigen::new(covariance);
             let products = eigen.eigenvectors.tr_mul(&features.tr_mul(&residual));
             let least = DEPENDENT * eigen.eigenvalues.max();
