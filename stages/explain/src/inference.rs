@@ -22,6 +22,7 @@ mod search;
 mod sharpen;
 mod space;
 mod state;
+mod step;
 mod temper;
 mod variants;
 
@@ -38,17 +39,13 @@ use margins::{Alternative, margins};
 use nuisance::{Nuisance, Source};
 use objective::{Objective, Set};
 use prior::Magnitude;
-use refine::Solution;
 use space::Space;
 use state::State;
+use step::Step;
 use variants::{Given, Variant};
 
 /// Most rounds of linearising, estimating the noise and searching. Resolution: bounds the computing time.
 const ROUNDS: usize = 10;
-
-/// Smallest share of a predicted gain that a step must have. Chosen: a half, between the quarter and the three quarters of
-/// Nocedal and Wright, algorithm 4.1.
-const TRUSTED: f64 = 0.5;
 
 /// An explanation and what is known of it.
 #[derive(Debug)]
@@ -163,78 +160,6 @@ fn first_that_bends(objective: &Objective<'_>, own: &Set, found: Set) -> (Set, b
     (found.into_iter().filter(kept).collect(), true)
 }
 
-/// A step from one explanation to the next. The objective is that of tangents, so the gain that it predicts is compared with
-/// the gain after refinement, and where that is less than half of it, fewer effects are added (a trust region; Nocedal and
-/// Wright, *Numerical Optimization*, 2006, chapter 4).
-struct Step<'a> {
-    problem: &'a Problem,
-    space: &'a Space,
-    state: &'a State<'a>,
-    objective: &'a Objective<'a>,
-    /// Value of the explanation that the step begins at \[nats\].
-    here: f64,
-}
-
-impl Step<'_> {
-    /// The set that is reached, its refined numbers, and whether it lacks some of what was found.
-    fn taken(&self, own: &Set, found: Set) -> (Set, Solution, bool) {
-        let score = |set: &Set| self.objective.score(set);
-        let mut added: Vec<(f64, usize)> = (found.iter().filter(|v| !own.contains(v)))
-            .map(|&v| (score(&search::without(&found, v)), v))
-            .collect();
-        added.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (mut set, mut first, mut count) = (found, 0, added.len());
-        loop {
-            let (solution, value) = self.refined(&set);
-            let predicted = score(&set) - score(own);
-            let gained = value - self.here;
-            let is_shortened = first > 0 || count < added.len();
-            if count == 0 || gained >= TRUSTED * predicted {
-                return (set, solution, is_shortened);
-            }
-            if count > 1 {
-                count /= 2;
-            } else {
-                first += 1;
-                count = usize::from(first < added.len());
-            }
-            set = own.clone();
-            set.extend(added[first..].iter().take(count).map(|(_, v)| *v));
-            set.sort_unstable();
-        }
-    }
-
-    /// The refined numbers of a set, without the effects that they leave nothing to do, and its value.
-    fn refined(&self, set: &Set) -> (Solution, f64) {
-        let (problem, space) = (self.problem, self.space);
-        let mut solution = refined(problem, space, self.objective, set);
-        loop {
-            let given = variants::of_fit(problem, &solution.fit, &self.state.efforts);
-            let measured = variants::measured(problem, &solution.fit);
-            let own = Objective::new(space, &measured, given);
-            let all: Set = (0..own.variants.len()).collect();
-            let kept = search::without_idle(&own, all.clone());
-            if kept == all {
-                return (solution, space.evidence(&measured) + own.score(&all));
-            }
-            solution = refined(problem, space, &own, &kept);
-        }
-    }
-}
-
-/// The numbers of a set, refined.
-fn refined(problem: &Problem, space: &Space, objective: &Objective<'_>, set: &Set) -> Solution {
-    let factors = objective.factors(set);
-    let own = set.iter().map(|&v| &objective.variants[v]);
-    let actives = own
-        .clone()
-        .zip(&factors)
-        .map(|(variant, factors)| variant.with(factors));
-    let fit = Fit::new(problem, actives.collect());
-    let deviations: Vec<f64> = own.flat_map(Variant::all_deviations).collect();
-    refine::refine(problem, space, fit, &deviations)
-}
-
 /// The columns of all effects that are linear in their numbers, scaled by their prior standard deviations.
 fn linear_columns(given: &[Given]) -> Vec<Column> {
     let is_linear = |v: &Variant| v.hypothesis.is_linear() && v.curve.is_none();
@@ -325,8 +250,11 @@ fn mean_bodies(nuisances: &[Nuisance], means: &[f64]) -> Vec<Active> {
 mod tests {
     use std::collections::BTreeSet;
 
+    use tauscope_dynamics::terms::effect;
+
     use super::*;
-    use crate::fixture::problem_with;
+    use crate::fixture::{model, problem, problem_with, recording};
+    use crate::physics::active::Whereabouts;
     use crate::physics::library;
 
     fn effects(
@@ -368,5 +296,34 @@ mod tests {
         assert!(near(at("viscous_friction"), 0, 1.2), "{found:?}");
         assert!(near(at("coulomb_friction"), 1, 0.8), "{found:?}");
         assert_eq!(found.len(), 2, "{found:?}");
+    }
+
+    /// Half a gain is also another set of masses; tangents prefer that, and it is worse once refined.
+    #[test]
+    fn half_a_gain_is_found_as_a_gain() {
+        let found = effects(|_, _, effort| effort[1] *= 0.55);
+        let [("torque_gain", 1, gain)] = &found[..] else {
+            panic!("{found:?}")
+        };
+        assert!((gain[0] - 0.55).abs() < 0.02, "{gain:?}");
+    }
+
+    /// The effort of a shape is no noise: a base upside down has hardly a tangent.
+    #[test]
+    fn a_base_upside_down_stays_an_effect() {
+        let plain = model();
+        let mut real = plain.clone();
+        real.set_gravity(plain.gravity().map(|g| -g));
+        let recordings = [1, 2, 3].map(|seed| recording(&real, seed, |_, _, _| {}));
+        let problem = problem(&plain, &recordings);
+        let tilt = Hypothesis {
+            effect: effect("base_tilt").unwrap(),
+            place: Whereabouts::default(),
+        };
+        let hypotheses = library::hypotheses(&problem.model, true, &BTreeSet::new());
+        let start = vec![tilt.with(vec![std::f64::consts::PI, 0.0])];
+        let inferred = infer(&problem, &hypotheses, start, true, &|_| {});
+        let found: Vec<Hypothesis> = inferred.fit.actives.iter().map(|a| a.hypothesis).collect();
+        assert_eq!(found, [tilt]);
     }
 }

@@ -21,7 +21,7 @@ pub struct Carrier {
     loaded: Model,
     /// The robot on its tilted base.
     tilted: Model,
-    /// What the first costs along the recorded motion, once that was asked for.
+    /// Effort of the first along the recorded motion, once it was asked for.
     recorded: OnceLock<Arc<Vec<f64>>>,
 }
 
@@ -35,7 +35,7 @@ impl Carrier {
         }
     }
 
-    /// What the robot with its bodies costs along the motion of all tracks, for `Term::know_recorded`.
+    /// Effort of the robot with its bodies along the motion of all tracks, for `Term::know_recorded`.
     pub fn recorded(&self, problem: &Problem) -> &Arc<Vec<f64>> {
         self.recorded
             .get_or_init(|| recorded(problem, &self.loaded))
