@@ -55,7 +55,7 @@ impl Step<'_> {
                 first += 1;
                 count = usize::from(first < added.len());
             }
-            set = own.clone();
+            set.clone_from(own);
             set.extend(added[first..].iter().take(count).map(|(_, v)| *v));
             set.sort_unstable();
         }
