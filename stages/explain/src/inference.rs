@@ -250,11 +250,8 @@ fn mean_bodies(nuisances: &[Nuisance], means: &[f64]) -> Vec<Active> {
 mod tests {
     use std::collections::BTreeSet;
 
-    use tauscope_dynamics::terms::effect;
-
     use super::*;
-    use crate::fixture::{model, problem, problem_with, recording};
-    use crate::physics::active::Whereabouts;
+    use crate::fixture::problem_with;
     use crate::physics::library;
 
     fn effects(
@@ -306,25 +303,5 @@ mod tests {
             panic!("{found:?}")
         };
         assert!((gain[0] - 0.55).abs() < 0.02, "{gain:?}");
-    }
-
-    /// The effort of a shape is no noise: a base upside down has hardly a tangent.
-    #[test]
-    fn a_base_upside_down_stays_an_effect() {
-        let plain = model();
-        let mut real = plain.clone();
-        real.set_gravity(plain.gravity().map(|g| -g));
-        let recordings = [1, 2, 3].map(|seed| recording(&real, seed, |_, _, _| {}));
-        let problem = problem(&plain, &recordings);
-        let tilt = Hypothesis {
-            effect: effect("base_tilt").unwrap(),
-            place: Whereabouts::default(),
-        };
-        let hypotheses = library::hypotheses(&problem.model, true, &BTreeSet::new());
-        let start = vec![tilt.with(vec![std::f64::consts::PI, 0.0])];
-        let inferred = infer(&problem, &hypotheses, start, true, &|_| {});
-        let found = inferred.fit.actives.iter().find(|a| a.hypothesis == tilt);
-        let roll = found.map(|active| active.coordinates[0]);
-        assert!(roll.is_some_and(|roll| roll > 2.5), "{roll:?}");
     }
 }

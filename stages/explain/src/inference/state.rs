@@ -243,3 +243,39 @@ fn friction_rms(problem: &Problem, fit: &Fit, rows: &Rows, joint: usize) -> f64 
     let friction = (0..count).map(|k| (x[0] * columns[0][k] + x[1] * columns[1][k]).powi(2));
     (friction.sum::<f64>() / count as f64).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use tauscope_dynamics::terms::effect;
+
+    use super::*;
+    use crate::fixture::{model, problem, recording};
+    use crate::inference::nuisance;
+    use crate::physics::active::{Hypothesis, Whereabouts};
+
+    /// A base upside down has hardly a tangent, so its effort is that of its shape.
+    #[test]
+    fn the_effort_of_a_shape_is_no_noise() {
+        let plain = model();
+        let mut real = plain.clone();
+        real.set_gravity(plain.gravity().map(|g| -g));
+        let recordings = [1, 2, 3].map(|seed| recording(&real, seed, |_, _, _| {}));
+        let problem = problem(&plain, &recordings);
+        let tilt = Hypothesis {
+            effect: effect("base_tilt").unwrap(),
+            place: Whereabouts::default(),
+        };
+        let fit = Fit::new(&problem, vec![tilt.with(vec![PI, 0.0])]);
+        let mut state = State::new(&problem, true);
+        let sizes = state.sizes(&fit);
+        let nuisances = nuisance::of(&problem, &fit, &sizes, true, state.scales);
+        let given = variants::of_fit(&problem, &fit, &state.efforts);
+        let measured = variants::measured(&problem, &fit);
+        state.estimate_noise(&fit, &nuisances, &given, &measured, false);
+        for (noise, effort) in state.noises.iter().zip(&state.efforts) {
+            assert!(noise.slow < 0.05 * effort.rms, "{noise:?}");
+        }
+    }
+}
