@@ -18,7 +18,7 @@ use super::variants::{self, Variant};
 /// Nocedal and Wright, algorithm 4.1.
 const TRUSTED: f64 = 0.5;
 
-/// Where a step begins, and what it is judged by.
+/// A step that begins at an explanation.
 pub struct Step<'a> {
     /// The recordings.
     pub problem: &'a Problem,
