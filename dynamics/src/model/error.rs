@@ -162,7 +162,12 @@ pub enum ModelError {
         second: String,
     },
     /// The robot is in pieces.
-    #[error("{} links have no parent joint: {}. A robot has one root: connect them to one link by fixed joints, or use one URDF for each arm", roots.len(), list(roots))]
+    #[error(
+        "{} links have no parent joint: {}. A robot has one root: connect them to one link by fixed joints, or use one URDF for \
+         each arm",
+        roots.len(),
+        list(roots)
+    )]
     SeveralRoots {
         /// The links that are no joint's child.
         roots: Vec<String>,

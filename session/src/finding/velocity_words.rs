@@ -6,7 +6,8 @@ use super::OddVelocity;
 use crate::suggest;
 
 /// Consequence of computed velocities.
-pub(super) const NOISIER: &str = "Computed velocities are noisier than measured ones, so the detector finds only stronger contacts while the arm moves";
+pub(super) const NOISIER: &str = "Computed velocities are noisier than measured ones, so the detector finds only \
+                                  stronger contacts while the arm moves";
 
 /// Velocity over derivative of the position below which the velocity does not follow the position.
 /// Resolution: a factor of a unit, such as 1/60, is far from it or is written with its digits.

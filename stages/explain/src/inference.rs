@@ -211,11 +211,10 @@ fn remaining(
     let Some(left_out) = LeftOut::new(space, &columns, &measured, pieces) else {
         return Vec::new();
     };
-    let of = |joint: usize| (0..pieces).map(move |piece| (joint, piece));
     let residuals: Vec<Vec<DVector<f64>>> = (0..problem.joints)
         .map(|joint| {
-            of(joint)
-                .map(|(j, piece)| left_out.residual(j, piece))
+            (0..pieces)
+                .map(|piece| left_out.residual(joint, piece))
                 .collect()
         })
         .collect();
@@ -295,7 +294,7 @@ mod tests {
         assert_eq!(found.len(), 2, "{found:?}");
     }
 
-    /// Half a gain is also another set of masses; tangents prefer that, and it is worse once refined.
+    /// Masses are a rival of a gain so far from one.
     #[test]
     fn half_a_gain_is_found_as_a_gain() {
         let found = effects(|_, _, effort| effort[1] *= 0.55);

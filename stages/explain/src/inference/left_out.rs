@@ -36,7 +36,7 @@ impl<'a> LeftOut<'a> {
             columns: all,
             without: Vec::new(),
         };
-        let grams: Vec<DMatrix<f64>> = (0..pieces).map(|r| fits.gram(r)).collect();
+        let grams: Vec<DMatrix<f64>> = (0..pieces).map(|piece| fits.gram(piece)).collect();
         let p = fits.columns.len() - 1;
         let whole = grams
             .iter()

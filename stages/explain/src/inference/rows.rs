@@ -2,7 +2,8 @@
 
 use crate::data::problem::Problem;
 
-/// Fewest pieces that are left out in turn. Resolution: a joint that moves in one recording of two is still predicted by others.
+/// Fewest pieces that are left out in turn. Resolution: a joint that moves in one recording of two is still predicted by
+/// others.
 const LEAST_PIECES: usize = 6;
 
 /// Pieces of equal length into which each recording is cut to be left out of a fit in turn.

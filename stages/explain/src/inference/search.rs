@@ -16,7 +16,7 @@ const BEAM: usize = 3;
 const ADDED: usize = 6;
 /// Best replacements that are tried for each effect. Resolution: changes the computing time.
 const REPLACED: usize = 3;
-/// Floods that a search begins with. Resolution: changes the computing time.
+/// Best floods that are followed. Resolution: changes the computing time.
 const FLOODS: usize = 3;
 /// Most steps. Resolution: bounds the computing time; a step that gains nothing is the last.
 const STEPS: usize = 30;
@@ -68,6 +68,7 @@ pub fn search(objective: &Objective<'_>, start: Set) -> Set {
     best
 }
 
+/// The better of two sets.
 fn better(objective: &Objective<'_>, a: Set, b: Set) -> Set {
     if objective.score(&b) > objective.score(&a) {
         b

@@ -2,7 +2,8 @@
 //!
 //! No real arm is as the model says, and thousands of rows then find evidence for anything. The likelihood of each joint is
 //! raised to a power below one instead ("coarsened"; Miller and Dunson, "Robust Bayesian Inference via Coarsening", JASA
-//! 2019): one over the dispersion of the residual in pieces of recordings that are left out, which is Pearson's statistic over its
+//! 2019): one over the dispersion of the residual in pieces of recordings that are left out, which is Pearson's statistic
+//! over its
 //! degrees of freedom (`McCullagh` and Nelder, *Generalized Linear Models*, 1989, section 4.5). It counts only
 //! the functions of the motion in which effects differ, because everything else is noise.
 

@@ -46,7 +46,7 @@ impl Carrier {
 pub fn carrier(model: &Model, actives: &[Active]) -> Option<Carrier> {
     let (mut loaded, mut tilted) = (model.clone(), model.clone());
     let mut is_other = false;
-    for term in (actives.iter().filter(|a| is_carried(a))).map(|a| a.term(model)) {
+    for term in (actives.iter().filter(|a| alters_robot(a))).map(|a| a.term(model)) {
         if let Some((link, inertia)) = term.inertia() {
             loaded.attach(link, inertia);
             is_other = true;
@@ -72,7 +72,7 @@ fn is_for_a_while(active: &Active) -> bool {
 }
 
 /// Whether an effect may change the robot that others act on, for good.
-pub fn is_carried(active: &Active) -> bool {
+pub fn alters_robot(active: &Active) -> bool {
     active.hypothesis.effect.layer == Layer::Body
         && active.hypothesis.lasts()
         && !active.hypothesis.is_torque_scale()

@@ -12,7 +12,7 @@ use crate::data::memo::MOST_ROWS;
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, Hypothesis, feeds};
 use crate::physics::bodies;
-use crate::physics::carrier::{Carrier, carrier, is_carried, is_on_carrier};
+use crate::physics::carrier::{Carrier, alters_robot, carrier, is_on_carrier};
 use crate::physics::efforts::{change, evaluated, transmitted};
 use crate::physics::torque_scale::gains;
 use crate::physics::unit_columns::units;
@@ -24,7 +24,7 @@ pub struct Parts {
     pub gains: Vec<f64>,
     /// Joints whose recording an effect transforms, so that it is not a sum of parts.
     pub transformed: Vec<bool>,
-    /// The robot with the bodies that were found, if there are any.
+    /// The robots that effects act on, where they are not that of the URDF.
     pub carrier: Option<Arc<Carrier>>,
     /// By effect, the effort that it adds before torque scales; `None` if it does not only add.
     columns: Vec<Option<Arc<Column>>>,
@@ -43,7 +43,7 @@ impl Parts {
             gains: gains(actives, problem.joints),
             transformed: transformed(actives, problem.joints),
             carrier: match before {
-                Some((others, before)) if same(actives, others, is_carried) => {
+                Some((others, before)) if same(actives, others, alters_robot) => {
                     before.carrier.clone()
                 }
                 _ => carrier(&problem.model, actives).map(Arc::new),
@@ -68,7 +68,7 @@ impl Parts {
                     let at = others.iter().position(|other| is_same(active, other))?;
                     let alike = (!active.needs_load()
                         || matches!((&parts.load, &before.load), (Some(a), Some(b)) if Arc::ptr_eq(a, b)))
-                        && (!is_on_carrier(active) || same(actives, others, is_carried));
+                        && (!is_on_carrier(active) || same(actives, others, alters_robot));
                     before.columns[at].clone().filter(|_| alike)
                 });
                 known.unwrap_or_else(|| Arc::new(parts.part(problem, active)))

@@ -1,4 +1,4 @@
-//! Remaining residual that a feature of the motion predicts in recordings that were left out of the fit.
+//! Remaining residual that a feature of the motion predicts in pieces of recordings that were left out of the fit.
 
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::words::number;
@@ -28,7 +28,7 @@ pub fn remainders(
             noise: noise[j],
             sentence: format!(
                 "At joint {}, {} {} remain that depend on its {}: a function of it predicts {:.0} % of the squared residual in \
-                 recordings that were left out of the fit.",
+                 pieces of recordings that were left out of the fit.",
                 joint.name,
                 number(rms),
                 unit_at(unit, joint),
