@@ -136,12 +136,14 @@ fn initialised(folder: &Path, format: Format) -> String {
     let file: TwinFile = serde_saphyr::from_str(&twin).unwrap();
     assert!(!file.terms.is_empty(), "{twin}");
     // Of an episode of a data set, the time starts at 0, so a session has other instants and other last digits.
+    // The noise is estimated from them, and the bodies, which are as in the URDF, are changed by what that tells.
     let mut terms: Vec<String> = file
         .terms
         .iter()
+        .filter(|term| term.effect != "link_inertia")
         .map(|term| {
             let parameters = term.parameters.iter();
-            let rounded = parameters.map(|(name, value)| format!("{name} {value:.5}"));
+            let rounded = parameters.map(|(name, value)| format!("{name} {value:.1}"));
             let rounded = rounded.collect::<Vec<_>>();
             format!(
                 "{} {:?} {:?} {rounded:?}",

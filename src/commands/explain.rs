@@ -18,16 +18,6 @@ use crate::progress::{Progress, Quiet};
 const READ: f64 = 0.05;
 const EXPLAINED: f64 = 0.95;
 
-/// Search for effects.
-#[derive(Debug, Clone, Copy, Default, clap::ValueEnum)]
-enum Method {
-    /// One addition or exchange at a time, by evidence.
-    #[default]
-    Stepwise,
-    /// By the marginal likelihood of whole explanations.
-    Inference,
-}
-
 /// Say which physics the twin leaves out, model it, and prove on recordings that were never fitted that the
 /// error falls.
 #[derive(Debug, clap::Args)]
@@ -65,10 +55,6 @@ pub struct Args {
     /// An effect, or a fault of recordings such as `effort_unit`, that is not considered; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
-    /// Search for effects. `inference` is to replace `stepwise`: its intervals hold the truth more often, and it still names too
-    /// much where several effects act at the same time.
-    #[arg(long, value_enum, default_value_t)]
-    method: Method,
     #[command(flatten)]
     force: Force,
     #[command(flatten)]
@@ -139,11 +125,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let request = args.request()?;
     explain::refuse_to_replace(&args.out, &request, args.force)?;
     let progress = Progress::of_work(args.quiet.show(out));
-    let mut input = explain::read(&request, &|share, what| progress.doing(READ * share, what))?;
-    input.method = match args.method {
-        Method::Stepwise => tauscope_explain::Method::Stepwise,
-        Method::Inference => tauscope_explain::Method::Inference,
-    };
+    let input = explain::read(&request, &|share, what| progress.doing(READ * share, what))?;
     explain::make(&args.out)?;
     let kept = Kept::of(&input);
     let step = |share: f64, what: &str| progress.doing(READ + (EXPLAINED - READ) * share, what);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use tauscope_dynamics::Model;
-use tauscope_explain::{Input, Method, Recording, RecordingTopics, Start};
+use tauscope_explain::{Input, Recording, RecordingTopics, Start};
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_session::{Joints, by_reason};
 use tauscope_twin::JointCorrection;
@@ -103,7 +103,6 @@ pub fn read(request: &Request, progress: &dyn Fn(f64, &str)) -> Result<Input, Re
         holdout,
         start,
         without: request.without.clone(),
-        method: Method::default(),
     })
 }
 

@@ -13,7 +13,7 @@ use tauscope_session::{Effect, by_recording};
 use tauscope_twin::telling_slopes_of;
 
 use crate::exit::Failure;
-use crate::explain::{self, Arguments, Kept, Request};
+use crate::explain::{self, Arguments, Kept, Named, Request};
 
 /// Largest torque constant of a joint \[N m/A\].
 /// Physical: 1 N m/A of a large motor behind a gear of 300.
@@ -184,41 +184,12 @@ fn scale(request: &Request) -> Option<EffortScale> {
     Some(EffortScale::of(&telling_slopes_of(&fitted.file)))
 }
 
-/// Holds out one of every four or less recordings, those in the middle by how far the joints move, so that neither a
-/// standing arm nor the liveliest motion is kept from the fit.
+/// Holds out some of the recordings, as `explain` does, in the request as in the input.
 fn hold_out(request: &mut Request, input: &mut Input) {
-    const FOR_ONE_HELD_OUT: usize = 4;
-    let joints = input.model.dof();
-    let mut sorted: Vec<(f64, String)> = input
-        .fit
-        .iter()
-        .map(|recording| (travel(recording, joints), recording.name.clone()))
-        .collect();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let count = sorted.len();
-    let held = count.div_ceil(FOR_ONE_HELD_OUT).min(count / 2);
-    let from = (count - held) / 2;
-    let is_held = |name: &str| sorted[from..from + held].iter().any(|(_, of)| of == name);
-    let (held, kept) = std::mem::take(&mut input.fit)
-        .into_iter()
-        .partition(|recording| is_held(&recording.name));
-    (input.holdout, input.fit) = (held, kept);
-    let (held, kept) = std::mem::take(&mut request.fit)
-        .into_iter()
-        .partition(|named| is_held(&named.name));
-    (request.holdout, request.fit) = (held, kept);
-}
-
-/// Total travel of the joints \[rad or m\].
-fn travel(recording: &Recording, joints: usize) -> f64 {
-    let rows: Vec<&[f64]> = recording.position.chunks_exact(joints).collect();
-    let steps = rows.windows(2).map(|pair| {
-        let joints = pair[0].iter().zip(pair[1]);
-        joints
-            .map(|(before, after)| (after - before).abs())
-            .sum::<f64>()
-    });
-    steps.sum()
+    input.hold_out_some();
+    let is_held = |named: &Named| input.holdout.iter().any(|held| held.name == named.name);
+    let all = std::mem::take(&mut request.fit).into_iter();
+    (request.holdout, request.fit) = all.partition(is_held);
 }
 
 /// Nothing begins on recordings from which nothing right can be learnt.

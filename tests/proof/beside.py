@@ -1,8 +1,8 @@
-"""Two programs, or two methods of one, on the same recordings in one run, case by case.
+"""Two programs, or one with two sets of options, on the same recordings in one run, case by case.
 
     python beside.py SET OUT "PROGRAM [OPTION...]" "PROGRAM [OPTION...]"
 
-For example: python beside.py tests/proof/set out/beside "target/debug/tauscope" "target/debug/tauscope --method inference"
+For example: python beside.py tests/proof/set out/beside ../before/target/debug/tauscope target/debug/tauscope
 SET holds answers.json and cases/; OPTIONs go to `explain`. Printed of each case: what table.py says of the findings, how
 many 95 % intervals hold the concealed number, the error left on the hold-out as a share, and the processor time. Then the sums.
 Standard library only.

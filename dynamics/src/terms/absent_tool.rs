@@ -34,7 +34,7 @@ pub static EFFECT: Effect = Effect {
     family: Family::Body,
     place: PlaceKind::Tool,
     layer: Layer::Body,
-    odds_nats: -7.0,
+    odds_nats: -3.0,
     parameters: &BODY_PARAMETERS,
     coordinates: &BODY_COORDINATES,
     to_parameters: |c| parameters(&array(c)).to_vec(),

@@ -1,14 +1,10 @@
 //! The context that every step of an explanation shares.
 
-use std::sync::Arc;
-
 use tauscope_dynamics::terms::{TermError, TermSpec};
 
 use crate::data::other_simulation::leave_out_other_states;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
-use crate::data::work::Work;
-use crate::fit::fitted::Fit;
 use crate::physics::active::Hypothesis;
 use crate::physics::library;
 use crate::read::input::Input;
@@ -32,8 +28,6 @@ pub struct Context<'a> {
     pub at_rest: bool,
     /// By how much another simulation's effort was late before it was put on the recordings' clock \[s\].
     pub twin_late_s: f64,
-    /// What was computed so far.
-    pub work: Arc<Work>,
 }
 
 impl Context<'_> {
@@ -105,7 +99,6 @@ impl Context<'_> {
             self.unit_nm,
             rests_count,
         );
-        problem.work = Arc::clone(&self.work);
         if !self.input.bodies && !self.at_rest {
             problem.is_foreign = true;
             leave_out_other_states(&mut problem);
@@ -123,24 +116,6 @@ impl Context<'_> {
             }
         }
         Ok(problem)
-    }
-
-    /// The held-out recordings and what the explanation `found` leaves there, if their efforts are known.
-    ///
-    /// # Errors
-    /// If a term of the start cannot be built for the robot.
-    pub fn held(
-        &self,
-        rests_count: &[bool],
-        found: &Fit,
-    ) -> Result<Option<(Problem, Fit)>, TermError> {
-        let held = &self.input.holdout;
-        if held.is_empty() || held.iter().any(|recording| recording.effort.is_empty()) {
-            return Ok(None);
-        }
-        let problem = self.problem(held, rests_count)?;
-        let fit = Fit::new(&problem, found.actives.clone());
-        Ok(Some((problem, fit)))
     }
 
     /// The gain of each joint's bodies that the fit starts from, from the model's unit into the recording's.

@@ -24,4 +24,3 @@ pub mod smoother;
 pub mod standstill;
 pub mod track;
 pub mod units;
-pub mod work;

@@ -5,27 +5,21 @@ mod in_motion;
 mod judged;
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use tauscope_dynamics::terms::TermError;
 
 use crate::context::Context;
 use crate::data::noise::white_noise;
 use crate::data::units::scales;
-use crate::data::work::Work;
 use crate::data::{other_simulation, remedies};
 use crate::outcome::Outcome;
 use crate::read::audit;
 use crate::read::excerpt::excerpts;
 use crate::read::input::Input;
 use crate::read::start::Start;
-use crate::report::holdout::Proof;
-use crate::report::remainder::Remainders;
-use crate::report::schema::{Finding, Report, Verdict};
+use crate::report::schema::{Finding, Remaining, Report, Verdict};
 use crate::report::slips::Slips;
-use crate::report::{
-    findings, handed_out, locate, notes, predicted, summary, verdict, without_law,
-};
+use crate::report::{locate, notes, remainder, summary, verdict, without_law};
 
 use judged::{Judged, Stop};
 
@@ -44,7 +38,7 @@ pub fn explain(
     }
     let at_rest = audit::at_rest(&input);
     if input.holdout.is_empty() && !at_rest {
-        hold_out_some(&mut input);
+        input.hold_out_some();
     }
     let excerpts = if at_rest {
         None
@@ -92,10 +86,6 @@ pub fn explain(
 /// Resolution: each joint may be in another's place, turned, and have another unit.
 const MOST_SLIPS_PER_JOINT: usize = 3;
 
-/// Once it has computed so much, a search names what it has and tries no more \[ns of one core\].
-/// Resolution: with what is not counted, about one minute.
-const MOST_WORK_NS: u64 = 30_000_000_000;
-
 /// What came of an attempt to explain.
 enum Attempt {
     Done(Box<Outcome>),
@@ -137,7 +127,6 @@ fn attempt(
         session_start_ns,
         at_rest,
         twin_late_s,
-        work: Arc::new(Work::bounded(MOST_WORK_NS)),
     };
     let mut judged = if at_rest {
         context.at_rest(progress)?
@@ -164,7 +153,7 @@ fn attempt(
 /// The report on the result of a search, with the errors on the held-out recordings.
 fn conclude(
     context: &Context<'_>,
-    mut judged: Judged,
+    judged: Judged,
     slips: &Slips,
     joints: &[String],
     progress: &(dyn Fn(f64, &str) + Sync),
@@ -174,14 +163,14 @@ fn conclude(
     let mut proof = context.proof(&judged.problem, &judged.before, &judged.found)?;
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
     let noise_floor = noise_floor(input);
-    let remainders = remainders(context, &mut judged, &mut proof, (&noise_floor, unit))?;
+    let units = (&noise_floor[..], context.unit_nm, unit);
+    let remaining = remainder::remaining(&input.model, &judged.found, &judged.remaining, units);
     let Judged {
         problem,
         before,
         found,
         mut named,
         undetectable,
-        rests_count,
         ..
     } = judged;
     let mut notes = named.notes;
@@ -191,18 +180,18 @@ fn conclude(
         input,
         &problem,
         &found,
-        &rests_count,
-        &remainders.all,
+        context.at_rest,
+        &remaining,
     ));
     let mut findings = slips.findings(joints, unit, context.unit_nm);
     notes.splice(0..0, slips.note());
     findings.append(&mut named.findings);
     slips.undo(&mut proof);
-    let verdict = verdict::verdict(&findings, &remainders, !input.bodies);
+    let verdict = verdict::verdict(&findings, &remaining, !input.bodies);
     let errors = [&proof.before[..], &proof.after[..]];
-    let (remaining, has_changed) = (&remainders.all, input.start.is_some());
-    let summary = summary::summary(verdict, &findings, remaining, joints, errors, has_changed);
-    findings.extend(without_law(input, &remainders, &findings));
+    let has_changed = input.start.is_some();
+    let summary = summary::summary(verdict, &findings, &remaining, joints, errors, has_changed);
+    findings.extend(without_law(input, &remaining, &findings));
     let report = Report {
         case: input.case.clone(),
         verdict,
@@ -214,7 +203,7 @@ fn conclude(
         findings,
         rejected: named.rejected,
         next_motions: named.next_motions,
-        remaining: remainders.all,
+        remaining,
         notes,
         joints: joints.to_vec(),
         sliding_joints: sliding_joints(input),
@@ -227,7 +216,7 @@ fn conclude(
     let (gain, gain_deviation) = context.final_gains(&found, &named.gain_deviation);
     Ok(Outcome {
         report,
-        terms: context.lasting_terms(&found, &proof.withheld),
+        terms: context.lasting_terms(&found, &proof.kept),
         gain,
         gain_deviation,
         predictions: proof.predictions,
@@ -236,53 +225,19 @@ fn conclude(
     })
 }
 
-/// The residual that is more than noise. A finding that the held-out recordings refute is rejected, unless the residual was
-/// tested on the fitted recordings alone.
-fn remainders(
-    context: &Context<'_>,
-    judged: &mut Judged,
-    proof: &mut Proof,
-    (noise, unit): (&[f64], &str),
-) -> Result<Remainders, TermError> {
-    let (problem, model) = (&judged.problem, &context.input.model);
-    if let Some(predicted) = &judged.remaining {
-        proof.withheld.clear();
-        let units = (noise, context.unit_nm, unit);
-        return Ok(predicted::remainders(
-            model,
-            &judged.found,
-            predicted,
-            units,
-        ));
-    }
-    let joints: Vec<String> = model.joint_names().map(str::to_owned).collect();
-    let named = &mut judged.named;
-    let kept = handed_out::reject(&proof.withheld, named, problem, &judged.found, &joints);
-    let proved = (&proof.after[..], &named.findings[..]);
-    let found = (problem, &kept);
-    let all = context.remainders(found, &judged.before, &judged.rests_count, unit, proved)?;
-    if !all.elsewhere.is_empty() {
-        findings::doubt_patches(&mut named.findings);
-    }
-    Ok(all)
-}
-
 /// Findings for what remains at a joint. What another simulation leaves there may be its own.
-fn without_law(input: &Input, remainders: &Remainders, said: &[Finding]) -> Vec<Finding> {
+fn without_law(input: &Input, remaining: &[Remaining], said: &[Finding]) -> Vec<Finding> {
     if !input.bodies {
         return Vec::new();
     }
     let in_amperes = input.effort_unit == "A";
-    without_law::findings(remainders, said, &sliding_joints(input), in_amperes)
+    without_law::findings(remaining, said, &sliding_joints(input), in_amperes)
 }
 
 impl Context<'_> {
-    /// Notes on how the twin was compared and what was not tried.
+    /// Notes on how the twin was compared.
     fn notes(&self) -> impl Iterator<Item = String> {
-        let untried = notes::untried(&self.work.untried());
-        untried
-            .into_iter()
-            .chain(notes::late_twin(self.twin_late_s))
+        notes::late_twin(self.twin_late_s).into_iter()
     }
 }
 
@@ -295,16 +250,6 @@ fn sliding_joints(input: &Input) -> Vec<String> {
 fn noise_floor(input: &Input) -> Vec<f64> {
     let n = input.model.dof();
     (0..n).map(|j| white_noise(&input.fit, j, n)).collect()
-}
-
-/// One in this many recordings is held out where the user names none.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const ONE_HELD_OUT_IN: usize = 3;
-
-/// Holds out the last recordings of those to be fitted.
-fn hold_out_some(input: &mut Input) {
-    let out = (input.fit.len() / ONE_HELD_OUT_IN).max(usize::from(input.fit.len() > 1));
-    input.holdout = input.fit.split_off(input.fit.len() - out);
 }
 
 fn not_evaluated(input: &Input, joints: Vec<String>, reason: String) -> Outcome {

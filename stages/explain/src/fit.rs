@@ -11,11 +11,10 @@
 pub mod body_prior;
 pub mod body_step;
 pub mod covariance;
+pub mod cross_validation;
 mod disagreement;
 pub mod fitted;
 pub mod interval;
 pub mod jacobian;
 pub mod least_squares;
 pub mod refine;
-pub mod untold;
-pub mod urdf_uncertainty;

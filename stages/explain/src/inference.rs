@@ -1,4 +1,6 @@
-//! Explanation by inference: one model of the data, one number that compares explanations, one search, one posterior.
+//! Step 6, inference: one model of the data, one number that compares explanations, one search, one posterior.
+//!
+//! In: the data of step 2, the hypotheses, and where step 5 begins. Out: an [`Inferred`], the most probable explanation.
 //!
 //! The effort of a joint is that of the nominal twin, plus the effects of an explanation, plus nuisances that every real
 //! arm has ([`nuisance`]), plus white and slow noise ([`noise`]). [`objective`] is the marginal likelihood of an
@@ -33,19 +35,23 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
 
+use around::Around;
 use left_out::LeftOut;
-pub use margins::AS_LIKELY;
-use margins::{Alternative, margins};
-use nuisance::{Nuisance, Source};
+use margins::margins;
+pub use margins::{AS_LIKELY, Alternative};
+use nuisance::{Nuisance, Size, Source};
 use objective::{Objective, Set};
 use prior::Magnitude;
 use space::Space;
-use state::State;
-use step::Step;
+use state::{State, disfavour};
+use step::{Step, Taken};
 use variants::{Given, Variant};
 
 /// Most rounds of linearising, estimating the noise and searching. Resolution: bounds the computing time.
-const ROUNDS: usize = 10;
+const ROUNDS: usize = 9;
+/// Scales of the errors of bodies that the search begins with, in usual errors. Resolution: of the two, the estimates that
+/// follow find any other.
+const STARTS: [f64; 2] = [1.0, 0.1];
 
 /// An explanation and what is known of it.
 #[derive(Debug)]
@@ -58,6 +64,8 @@ pub struct Inferred {
     pub margins: Vec<f64>,
     /// By effect, other effects that would take its place, best first.
     pub alternatives: Vec<Vec<Alternative>>,
+    /// Effects with one factor that were not found, and the smallest factor that would have been.
+    pub smallest: Vec<(Hypothesis, f64)>,
     /// Mean changes of the links' inertial parameters, as effects.
     pub bodies: Vec<Active>,
     /// Features of the motion that predict what is left.
@@ -73,63 +81,173 @@ pub fn infer(
     say: &dyn Fn(&str),
 ) -> Inferred {
     let mut state = State::new(problem, bodies);
-    let mut fit = Fit::new(problem, start);
-    let mut round = 0;
-    loop {
+    let mut fit = begun(
+        problem,
+        hypotheses,
+        &mut state,
+        Fit::new(problem, start),
+        say,
+    );
+    for round in 1.. {
         say("comparing explanations");
         let sizes = state.sizes(&fit);
         let nuisances = nuisance::of(problem, &fit, &sizes, bodies, state.scales);
         let given = variants::all(problem, &fit, hypotheses, &state.efforts);
         let measured = variants::measured(problem, &fit);
-        state.estimate_noise(&fit, &nuisances, &given, &measured, round == 0);
-        if round == 0 {
-            let linear = linear_columns(&given);
-            state.estimate_tempers(&fit, &nuisances, &linear, &measured);
-        }
+        state.estimate_noise(&fit, &nuisances, &given, &measured, false);
         let space = state.space(&nuisances);
-        let mut objective = Objective::new(&space, &measured, given);
+        let (objective, taken, is_partial) = searched(problem, &state, &space, &fit, given);
         let own: Set = (0..fit.actives.len()).collect();
-        objective.extend(sharpen::sharpened(
-            problem,
-            &fit,
-            &objective,
-            &own,
-            &state.efforts,
-        ));
-        let (found, is_partial) =
-            first_that_bends(&objective, &own, search::search(&objective, own.clone()));
-        let found = nested::simplest(&objective, found);
-        let here = space.evidence(&measured) + objective.score(&own);
-        let step = Step {
-            problem,
-            space: &space,
-            state: &state,
-            objective: &objective,
-            here,
-        };
-        let (found, solution, is_shortened) = step.taken(&own, found);
-        let gained = objective.score(&found) - objective.score(&own);
-        let is_partial = is_partial || is_shortened && gained > 0.0;
-        let effects: Vec<Hypothesis> = solution.fit.actives.iter().map(|a| a.hypothesis).collect();
-        round += 1;
+        let gained = objective.score(&taken.set) - objective.score(&own);
+        let is_partial = is_partial || taken.is_shortened && gained > 0.0;
         let is_settled = round > 1 && !is_partial && gained < AS_LIKELY;
+        let solution = taken.solution;
         if is_settled || round == ROUNDS {
-            let (margins, alternatives) = margins(&objective, &found, &effects);
+            let actives = solution.fit.actives.iter();
+            let effects: Vec<Hypothesis> = actives.map(|a| a.hypothesis).collect();
+            let (margins, alternatives) = margins(&objective, &taken.set, &effects);
             return Inferred {
                 covariance: solution.covariance,
                 margins,
                 alternatives,
+                smallest: smallest(&objective, &taken.set),
                 bodies: mean_bodies(&nuisances, solution.nuisances.as_slice()),
                 remaining: remaining(problem, &space, &solution.fit, &state.efforts),
                 fit: solution.fit,
             };
         }
         fit = solution.fit;
-        state.estimate_scales(&fit, &sizes);
-        state.mark_tail(&space, &fit);
-        let (columns, measured) = tangents(problem, &fit, &state.efforts);
-        state.estimate_tempers(&fit, &nuisances, &columns, &measured);
+        follow(problem, &mut state, &space, &fit, &sizes, &nuisances);
     }
+    unreachable!("the last round returns")
+}
+
+/// The first explanation, next to bodies that are as the URDF says and next to bodies with usual errors: the more probable of
+/// both. Bodies with usual errors would hide what is small; where they are off, next to exact ones they look like effects.
+fn begun(
+    problem: &Problem,
+    hypotheses: &[Hypothesis],
+    state: &mut State<'_>,
+    fit: Fit,
+    say: &dyn Fn(&str),
+) -> Fit {
+    say("comparing explanations");
+    let sizes = state.sizes(&fit);
+    let measured = variants::measured(problem, &fit);
+    let nuisances = nuisance::of(problem, &fit, &sizes, state.bodies, state.scales);
+    let given = variants::all(problem, &fit, hypotheses, &state.efforts);
+    state.estimate_noise(&fit, &nuisances, &given, &measured, true);
+    state.estimate_tempers(&fit, &nuisances, &linear_columns(&given), &measured);
+    let mut given = Some(given);
+    let starts: &[f64] = if state.bodies { &STARTS } else { &STARTS[..1] };
+    let tried = starts.iter().map(|&scale| {
+        state.scales[0] = scale;
+        let nuisances = nuisance::of(problem, &fit, &sizes, state.bodies, state.scales);
+        let space = state.space(&nuisances);
+        let given = (given.take())
+            .unwrap_or_else(|| variants::all(problem, &fit, hypotheses, &state.efforts));
+        let (_, taken, _) = searched(problem, state, &space, &fit, given);
+        let value = taken.value - disfavour(state.scales);
+        (value, scale, taken.solution.fit, space, nuisances)
+    });
+    let best = tried.max_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((_, scale, found, space, nuisances)) = best else {
+        return fit;
+    };
+    state.scales[0] = scale;
+    follow(problem, state, &space, &found, &sizes, &nuisances);
+    found
+}
+
+/// Searches from an explanation and refines what is found: the objective, what is reached, and whether a part of it was left for
+/// later.
+fn searched<'s>(
+    problem: &Problem,
+    state: &State<'_>,
+    space: &'s Space,
+    fit: &Fit,
+    given: Vec<Given>,
+) -> (Objective<'s>, Taken, bool) {
+    let measured = variants::measured(problem, fit);
+    let mut objective = Objective::new(space, &measured, given);
+    let own: Set = (0..fit.actives.len()).collect();
+    let sharper = sharpen::sharpened(problem, fit, &objective, &own, &state.efforts);
+    objective.extend(sharper);
+    let found = search::search(&objective, own.clone());
+    let (found, is_partial) = first_that_bends(&objective, &own, found);
+    let found = nested::simplest(&objective, found);
+    let here = space.evidence(&measured) + objective.score(&own);
+    let step = Step {
+        problem,
+        space,
+        state,
+        objective: &objective,
+        here,
+    };
+    let taken = step.taken(&own, found);
+    (objective, taken, is_partial)
+}
+
+/// Estimates what accompanies an explanation anew.
+fn follow(
+    problem: &Problem,
+    state: &mut State<'_>,
+    space: &Space,
+    fit: &Fit,
+    sizes: &[Size],
+    nuisances: &[Nuisance],
+) {
+    state.estimate_scales(fit, sizes);
+    state.mark_tail(space, fit);
+    let (columns, measured) = tangents(problem, fit, &state.efforts);
+    state.estimate_tempers(fit, nuisances, &columns, &measured);
+}
+
+/// An explanation as it is, with what is known of it: its numbers stay, and nothing is added.
+pub fn around(problem: &Problem, hypotheses: &[Hypothesis], fit: Fit, bodies: bool) -> Inferred {
+    let mut state = State::new(problem, bodies);
+    let sizes = state.sizes(&fit);
+    let nuisances = nuisance::of(problem, &fit, &sizes, bodies, state.scales);
+    let given = variants::all(problem, &fit, hypotheses, &state.efforts);
+    let measured = variants::measured(problem, &fit);
+    state.estimate_noise(&fit, &nuisances, &given, &measured, false);
+    let space = state.space(&nuisances);
+    let objective = Objective::new(&space, &measured, given);
+    let own: Set = (0..fit.actives.len()).collect();
+    let effects: Vec<Hypothesis> = fit.actives.iter().map(|a| a.hypothesis).collect();
+    let (margins, alternatives) = margins(&objective, &own, &effects);
+    let deviations: Vec<f64> = (objective.variants[..own.len()].iter())
+        .flat_map(Variant::all_deviations)
+        .collect();
+    Inferred {
+        covariance: refine::covariance(problem, &space, &fit, &deviations),
+        margins,
+        alternatives,
+        smallest: smallest(&objective, &own),
+        bodies: Vec::new(),
+        remaining: Vec::new(),
+        fit,
+    }
+}
+
+/// The smallest factor with which each effect that a set lacks would join it, of those that have one factor and are told.
+fn smallest(objective: &Objective<'_>, set: &Set) -> Vec<(Hypothesis, f64)> {
+    let Some(around) = Around::new(objective, set) else {
+        return Vec::new();
+    };
+    let is_told = |v: &usize| {
+        let hypothesis = objective.variants[*v].hypothesis;
+        hypothesis.effect.traits.smallest_told_as.is_some() && objective.fits(set, *v)
+    };
+    let told = (0..objective.variants.len()).filter(is_told);
+    let mut all: Vec<(Hypothesis, f64)> = Vec::new();
+    for v in told {
+        let hypothesis = objective.variants[v].hypothesis;
+        if all.iter().all(|(other, _)| *other != hypothesis) {
+            all.extend(around.smallest(v).map(|factor| (hypothesis, factor)));
+        }
+    }
+    all
 }
 
 /// The set with only one new effect whose effort is not linear in its numbers and that several joints feel, and whether any

@@ -10,15 +10,16 @@ mod fixture;
 mod inference;
 mod measure;
 mod outcome;
+mod parallel;
 mod physics;
+mod propose;
 mod read;
 pub mod report;
-mod select;
 
 pub use explain::explain;
 pub use measure::{Measured, Number, measure};
 pub use outcome::Outcome;
-pub use read::input::{Input, Method};
+pub use read::input::Input;
 pub use read::recording::{Losses, Recording, RecordingTopics};
 pub use read::start::Start;
 pub use report::html;

@@ -20,10 +20,10 @@ use crate::fit::fitted::Fit;
 use crate::fit::interval::{half_width_95, parameter_deviations};
 use crate::physics::active::{Active, Hypothesis};
 use crate::physics::torque_scale::unknown_scales;
+use crate::propose::base::Base;
 use crate::read::audit;
 use crate::read::input::Input;
 use crate::read::recording::Recording;
-use crate::select::propose::Base;
 
 /// A joint is measured if at least this many of its rows are compared.
 /// Resolution: ten for each of its numbers.
@@ -82,7 +82,6 @@ pub fn measure(input: &Input) -> Result<Result<Measured, String>, TermError> {
         session_start_ns: begins.min().unwrap_or(0),
         at_rest: false,
         twin_late_s: 0.0,
-        work: std::sync::Arc::default(),
     };
     let problem = context.problem(&input.fit, &vec![false; n])?;
     let count = |joint: usize| {
@@ -251,7 +250,6 @@ mod tests {
             holdout: Vec::new(),
             start: None,
             without: std::collections::BTreeSet::new(),
-            method: crate::read::input::Method::default(),
         }
     }
 

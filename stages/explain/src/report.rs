@@ -1,28 +1,25 @@
-//! Step 6, report: findings in words, with intervals and rivals, and the test on recordings held out.
+//! Step 7, report: findings in words, with intervals and rivals, and the test on recordings held out.
 //!
-//! In: the explanation of step 5. Out: a [`schema::Report`] (written as `report.json`), the same as a page
+//! In: the explanation of step 6. Out: a [`schema::Report`] (written as `report.json`), the same as a page
 //! ([`html`]), the corrected twin, and its predictions for the recordings held out, which no number was fitted to
-//! (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 2009, section 7.2). Rivals whose evidence
-//! differs by less than 5 nats count as a tie and are reported with the motion that would separate them.
+//! (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 2009, section 7.2). Rivals that are
+//! as likely are reported with the motion that would separate them.
 
 pub(crate) mod corrected_twin;
 pub(crate) mod findings;
 pub(crate) mod handed_out;
-pub(crate) mod history;
 pub(crate) mod holdout;
 pub mod html;
 pub(crate) mod locate;
 pub(crate) mod look_at;
 pub(crate) mod next_motion;
 pub(crate) mod notes;
-pub(crate) mod predicted;
 pub(crate) mod remainder;
 pub(crate) mod schema;
 pub(crate) mod sentences;
 pub(crate) mod slip_words;
 pub(crate) mod slips;
 pub(crate) mod summary;
-pub(crate) mod varying_delay;
 pub(crate) mod verdict;
 pub(crate) mod without_law;
 

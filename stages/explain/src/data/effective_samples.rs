@@ -44,23 +44,6 @@ pub fn per_row(problem: &Problem) -> Vec<f64> {
         .collect()
 }
 
-/// The same, or that of the `residual` of a fit if it is whiter: the noise is no more correlated than the residual.
-pub fn at_least(problem: &Problem, residual: &[f64]) -> Vec<f64> {
-    let of_joint = |(joint, known): (usize, &f64)| {
-        known.max(of_left(
-            problem,
-            joint,
-            &residual[problem.joint_rows(joint)],
-        ))
-    };
-    problem
-        .effective_samples
-        .iter()
-        .enumerate()
-        .map(of_joint)
-        .collect()
-}
-
 fn of_left(problem: &Problem, joint: usize, left: &[f64]) -> f64 {
     let r = (calm_correlation(problem, joint, left) + CALM_BIAS).clamp(0.0, 1.0);
     ((1.0 - r) / (1.0 + r)).clamp(LEAST, 1.0)
@@ -213,17 +196,5 @@ mod tests {
         assert!(white > 0.5, "{white}");
         assert!(slow < 0.5 * white, "{slow} of {white}");
         assert!(slow >= LEAST);
-    }
-
-    #[test]
-    fn a_whiter_residual_shows_that_the_noise_is_no_more_correlated_than_that() {
-        let model = model();
-        let mut data = problem(&model, &[recording(&model, 1, |_, _, _| {})]);
-        data.effective_samples = vec![0.1, 0.9];
-        let mut noise = Noise(3);
-        let white: Vec<f64> = (0..data.joints * data.rows).map(|_| noise.next()).collect();
-        let constant = vec![1.0; white.len()];
-        assert!(at_least(&data, &white)[0] > 0.5);
-        assert_eq!(at_least(&data, &constant), [0.1, 0.9]);
     }
 }

@@ -159,7 +159,6 @@ impl Problem {
             known_friction: vec![BTreeMap::new(); n],
             is_foreign: false,
             cache: Arc::default(),
-            work: Arc::default(),
             units: Arc::default(),
             bare: OnceLock::new(),
             rigid: OnceLock::new(),

@@ -10,7 +10,6 @@ use crate::data::column::Column;
 use crate::data::efforts::{Efforts, TrackEfforts};
 use crate::data::memo::{ColumnCache, UnitEfforts};
 use crate::data::track::FitTrack;
-use crate::data::work::Work;
 
 /// Everything that a fit works on. A *signal* is joint-major: `rows` numbers for joint 0, then for joint 1,
 /// and so on; the rows of each joint are those of the tracks, one after the other.
@@ -51,8 +50,6 @@ pub struct Problem {
     pub is_foreign: bool,
     /// Columns that were computed before.
     pub cache: Arc<ColumnCache>,
-    /// What was computed so far, of all problems of an explanation.
-    pub work: Arc<Work>,
     /// What unit bodies cost.
     pub units: Arc<UnitEfforts>,
     /// What the robot costs along the recorded motion, once that was asked for: by joint and sample of all tracks.
@@ -63,12 +60,6 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Whether the twin was fitted to this arm before: it has the arm's friction.
-    pub fn is_beside_fitted_twin(&self) -> bool {
-        let has_friction = self.known_friction.iter().any(|known| !known.is_empty());
-        has_friction && !self.is_foreign
-    }
-
     /// The same where one recording does not count.
     #[must_use]
     pub fn without(&self, track: usize) -> Self {
@@ -155,11 +146,6 @@ impl Problem {
                 .collect();
             track.compare(joint, one, &mut into[track.rows()]);
         }
-    }
-
-    /// Samples of all tracks.
-    pub fn samples(&self) -> usize {
-        self.tracks.iter().map(|track| track.track.len()).sum()
     }
 
     /// One joint's effort over all tracks, one number a sample, as a column.

@@ -8,14 +8,13 @@ use crate::data::problem::Problem;
 use crate::data::track::BEGINNING_S;
 use crate::explain::judged::{Judged, Stop};
 use crate::fit::fitted::Fit;
+use crate::inference;
 use crate::physics::active::{Hypothesis, TimeKind};
+use crate::physics::plausible::plausible;
+use crate::propose::base::Base;
 use crate::read::audit;
 use crate::read::recording::Recording;
 use crate::report::findings;
-use crate::select::explanation::Explanation;
-use crate::select::plausible::plausible;
-use crate::select::propose::Base;
-use crate::select::search::Search;
 use tauscope_dynamics::kinematic_tree::bearing;
 
 /// The residual stands out where it is this many times its standard deviation at the beginning, over all joints.
@@ -159,14 +158,10 @@ fn order(problem: &Problem, joint: usize) -> usize {
 
 /// One push for each interval in which the residual stands out. Its link is the one where a constant force explains most
 /// of the residual, among the links next to the last joint that is loaded.
-fn pushes(search: &Search<'_>) -> Explanation {
-    let problem = search.problem;
-    let mut best = Explanation {
-        fit: Fit::new(problem, Vec::new()),
-        penalties: Vec::new(),
-    };
-    let deviations = deviations(problem, &best.fit);
-    let intervals = stands_out(problem, &best.fit, &deviations);
+fn pushes(problem: &Problem, hypotheses: &[Hypothesis]) -> Fit {
+    let mut best = Fit::new(problem, Vec::new());
+    let deviations = deviations(problem, &best);
+    let intervals = stands_out(problem, &best, &deviations);
     let length_s: f64 = intervals.iter().map(|(from, to)| to - from).sum();
     let whole_s = problem.tracks[0]
         .track
@@ -177,20 +172,19 @@ fn pushes(search: &Search<'_>) -> Explanation {
         return best;
     }
     for interval in intervals {
-        let last = last_to_feel(problem, &best.fit, &deviations, interval);
+        let last = last_to_feel(problem, &best, &deviations, interval);
         let near = |h: &&Hypothesis| match (last, problem.model.links()[h.place.link].joint) {
             (Some(last), Some(joint)) => order(problem, last).abs_diff(order(problem, joint)) <= 1,
             _ => true,
         };
-        let base = Base::new(problem, &best.fit, search.hypotheses.len());
+        let base = Base::new(problem, &best, hypotheses.len());
         let within = |h: &Hypothesis| base.propose_within(*h, interval, Some(0));
-        let proposals = search.hypotheses.iter().filter(near).filter_map(within);
+        let proposals = hypotheses.iter().filter(near).filter_map(within);
         let possible = proposals.filter(|p| plausible(problem, &p.active));
         let push = possible.max_by(|a, b| a.gain.total_cmp(&b.gain));
         if let Some(push) = push {
             // Its times are those of the interval: a force that grows and fades has no sharper ones.
-            best.fit = best.fit.with(problem, push.active);
-            best.penalties.push(push.penalty);
+            best = best.with(problem, push.active);
         }
     }
     best
@@ -212,29 +206,24 @@ impl Context<'_> {
             h.time_kind() == TimeKind::Once && !stays
         };
         hypotheses.retain(passes);
-        let say = |text: &str| progress(0.1, text);
+        progress(0.1, "looking for pushes");
         let (mut actives, mut undetectable) = (Vec::new(), Vec::new());
         let mut named = findings::Named::default();
         let known = |recording: &&Recording| !audit::is_frozen(recording, joints.len());
         for recording in input.fit.iter().filter(known) {
             let problem = self.problem(std::slice::from_ref(recording), &rests_count)?;
-            let search = Search {
-                problem: &problem,
-                unnamed_bodies: &[],
-                hypotheses: &hypotheses,
-                say: &say,
-            };
             let before = Fit::new(&problem, Vec::new());
-            let found = pushes(&search);
-            let mut own = findings::of(&search, &found, &before, self, &joints);
+            let found = pushes(&problem, &hypotheses);
+            let inferred = inference::around(&problem, &hypotheses, found, input.bodies);
+            let mut own = findings::of(&problem, &inferred, &before, self, &joints);
             // No further motion tells more about a push that is over.
             own.next_motions.clear();
             own.trajectories.clear();
             named.extend(own);
             if undetectable.is_empty() {
-                undetectable = findings::undetectable(&search, &found, self, &joints);
+                undetectable = findings::undetectable(&inferred.smallest, self, &joints);
             }
-            actives.extend(found.fit.actives);
+            actives.extend(inferred.fit.actives);
         }
         if named.findings.is_empty() {
             let reason =
@@ -260,9 +249,8 @@ impl Context<'_> {
             found: Fit::new(&problem, actives),
             named,
             undetectable,
-            rests_count,
             problem,
-            remaining: None,
+            remaining: Vec::new(),
         }))
     }
 }

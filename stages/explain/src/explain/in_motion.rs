@@ -8,17 +8,16 @@ use crate::data::problem::Problem;
 use crate::data::remedies::{self, Remedy, Slip};
 use crate::data::same_robot::Likeness;
 use crate::explain::judged::{Judged, Stop};
+use crate::fit::body_prior::make_consistent;
 use crate::fit::fitted::Fit;
-use crate::inference::infer;
-use crate::physics::active::{Active, Hypothesis};
+use crate::inference;
+use crate::physics::active::Active;
 use crate::physics::{library, torque_scale};
-use crate::read::input::Method;
 use crate::report::findings;
-use crate::select::propose::penalty;
-use crate::select::search::Search;
 
 impl Context<'_> {
-    /// Searches in motion alone, then with the standstills of the joints that have no set-valued friction.
+    /// Infers the effects from the rows in motion. At rest friction may have any value up to its breakaway, so those rows say
+    /// little, and they are left out.
     pub fn in_motion(
         &self,
         progress: &(dyn Fn(f64, &str) + Sync),
@@ -30,91 +29,37 @@ impl Context<'_> {
             Ok(turn) => turn,
             Err(stop) => return Ok(Err(stop)),
         };
-        let hypotheses = self.hypotheses();
-        let unnamed_bodies = if input.bodies {
-            library::unnamed_bodies(&input.model, &input.without)
-        } else {
-            Vec::new()
-        };
+        let mut hypotheses = self.hypotheses();
+        if input.bodies {
+            hypotheses.extend(library::unnamed_bodies(&input.model, &input.without));
+        }
         // Unknown torque scales are fitted before the twin is compared.
         let scales = || torque_scale::unknown_scales(&self.unscaled);
-        let say = |text: &str| {
-            // The number of rounds is not known, so the share stays.
-            progress(0.1, text);
-        };
-        let search = Search {
-            problem: &problem,
-            hypotheses: &hypotheses,
-            unnamed_bodies: &unnamed_bodies,
-            say: &say,
-        };
-        let (start, penalties) = started(&search, scales(), turn, input.bodies);
-        if input.method == Method::Inference {
-            return Ok(Ok(self.inferred(&search, start, scales())));
-        }
-        let moving = search.first_guess(start, penalties);
-        // Without set-valued friction, standstills are as informative as motion.
-        progress(0.3, "comparing standstills");
-        let dry = (input.start.as_ref()).map_or_else(
-            // Another simulation has friction of its own, and says nothing where the real one holds.
-            || vec![!input.bodies; joints.len()],
-            |start| start.is_dry(&input.model),
-        );
-        let rests_count: Vec<bool> = (0..joints.len())
-            .map(|j| {
-                let holds = |a: &Active| {
-                    a.hypothesis.only_joint() == Some(j) && a.is_set_valued(&input.model)
-                };
-                !dry[j] && !moving.fit.actives.iter().any(holds)
-            })
-            .collect();
-        let problem = if rests_count.contains(&true) {
-            self.problem(&input.fit, &rests_count)?
-        } else {
-            problem
-        };
-        let search = Search {
-            problem: &problem,
-            hypotheses: &hypotheses,
-            unnamed_bodies: &unnamed_bodies,
-            say: &say,
-        };
-        let found = search.run(moving.fit.actives, moving.penalties);
-        progress(0.8, "comparing alternative explanations");
+        let mut start = scales();
+        // A base that is turned so far that no search in small steps would find it.
+        let tilt = (hypotheses.iter()).find(|h| h.effect.place == PlaceKind::Base);
+        start.extend(tilt.zip(turn).map(|(tilt, turn)| tilt.with(turn.to_vec())));
+        // The number of rounds is not known, so the share stays.
+        let say = |text: &str| progress(0.1, text);
+        let inferred = inference::infer(&problem, &hypotheses, start, input.bodies, &say);
+        progress(0.8, "wording the findings");
         let before = Fit::new(&problem, scales()).refined(&problem);
-        let named = findings::of(&search, &found, &before, self, &joints);
-        let undetectable = findings::undetectable(&search, &found, self, &joints);
+        let named = findings::of(&problem, &inferred, &before, self, &joints);
+        let undetectable = findings::undetectable(&inferred.smallest, self, &joints);
+        // A twin that is corrected has the bodies' mean changes, too, which are too small for a finding.
+        let mut actives = inferred.fit.actives;
+        if !named.findings.is_empty() {
+            add_bodies(&mut actives, inferred.bodies);
+            make_consistent(&problem.model, &mut actives);
+        }
         Ok(Ok(Judged {
             before,
-            found: found.fit,
+            found: Fit::new(&problem, actives),
             named,
             undetectable,
-            rests_count,
+            remaining: inferred.remaining,
             problem,
-            remaining: None,
         }))
-    }
-
-    /// The explanation by inference.
-    fn inferred(&self, search: &Search<'_>, start: Vec<Active>, scales: Vec<Active>) -> Judged {
-        let problem = search.problem;
-        let joints: Vec<String> = problem.model.joint_names().map(str::to_owned).collect();
-        let hypotheses = [search.hypotheses, search.unnamed_bodies].concat();
-        let inferred = infer(problem, &hypotheses, start, self.input.bodies, search.say);
-        let before = Fit::new(problem, scales).refined(problem);
-        let named = findings::of_inferred(search, &inferred, &before, self, &joints);
-        // Predictions have the bodies' mean changes, too, which are too small for a finding.
-        let mut actives = inferred.fit.actives;
-        actives.extend(inferred.bodies);
-        Judged {
-            before,
-            found: Fit::new(problem, actives),
-            named,
-            undetectable: Vec::new(),
-            remaining: Some(inferred.remaining),
-            rests_count: vec![false; joints.len()],
-            problem: problem.clone(),
-        }
     }
 
     /// The turn of the base that the efforts ask for, if any.
@@ -155,26 +100,16 @@ impl Context<'_> {
     }
 }
 
-/// The effects that a search starts from, with their penalties: a base that is turned so far that no search in small
-/// steps would find it is one of them.
-fn started(
-    search: &Search<'_>,
-    mut start: Vec<Active>,
-    turn: Option<[f64; 2]>,
-    bodies: bool,
-) -> (Vec<Active>, Vec<f64>) {
-    if !bodies {
-        // The other simulation has friction of its own.
-        let plain = search.hypotheses.iter().filter(|h| h.is_plain_friction());
-        start.extend(plain.map(|h| h.with(vec![0.0])));
+/// Adds changes of bodies to effects: to the body that was found of a link, if there is one.
+fn add_bodies(actives: &mut Vec<Active>, bodies: Vec<Active>) {
+    for body in bodies {
+        let known = actives.iter_mut().find(|a| a.hypothesis == body.hypothesis);
+        let Some(known) = known else {
+            actives.push(body);
+            continue;
+        };
+        for (x, change) in known.coordinates.iter_mut().zip(body.coordinates) {
+            *x += change;
+        }
     }
-    let mut penalties = vec![0.0; start.len()];
-    let of_base = |h: &&Hypothesis| h.effect.place == PlaceKind::Base;
-    if let (Some(turn), Some(tilt)) = (turn, search.hypotheses.iter().find(of_base)) {
-        let nothing = Fit::new(search.problem, start.clone());
-        let library = (search.hypotheses.len() as f64).ln();
-        penalties.push(penalty(&nothing, library, turn.len(), None));
-        start.push(tilt.with(turn.to_vec()));
-    }
-    (start, penalties)
 }

@@ -19,10 +19,8 @@ pub struct Judged {
     pub named: Named,
     /// The smallest effects that would have been found.
     pub undetectable: Vec<Undetectable>,
-    /// Features that predict the residual of the fitted recordings, if that was tested.
-    pub remaining: Option<Vec<Predicted>>,
-    /// By joint, whether its standstills are compared.
-    pub rests_count: Vec<bool>,
+    /// Features that predict the residual of the fitted recordings.
+    pub remaining: Vec<Predicted>,
 }
 
 /// Why a search did not begin.

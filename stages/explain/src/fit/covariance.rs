@@ -1,18 +1,14 @@
-//! Covariance of the numbers of an explanation: from noise that is correlated in time, and from errors of the URDF's
-//! bodies that no finding names.
+//! Covariance of the numbers of a fit from noise that is correlated in time.
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
 use crate::data::column::Column;
-use crate::data::noise::MEDIAN_OF_ABS_NORMAL;
 use crate::data::problem::Problem;
 use crate::fit::body_prior;
 use crate::fit::disagreement::Disagreement;
 use crate::fit::fitted::{Fit, LEAST_VARIANCE};
-use crate::fit::urdf_uncertainty::usual_errors;
-use crate::physics::active::Hypothesis;
 
 /// Lags over which a prewhitened score is taken to be correlated, in compared samples.
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -23,9 +19,6 @@ const MOST_KEPT: f64 = 0.97;
 /// Added to the diagonal of the normal matrix, scaled to 1.
 /// Resolution: far above the rounding of f64, far below what the noise hides.
 const RIDGE: f64 = 1e-9;
-/// Bodies are not taken to be off by more than so many usual errors.
-/// Physical: a mass that is off by a fifth is a finding.
-const LARGEST_ERROR: f64 = 2.0;
 
 /// Covariance of all free coordinates of a fit, in the order of [`Fit::parameters`], from the noise.
 ///
@@ -33,45 +26,6 @@ const LARGEST_ERROR: f64 = 2.0;
 /// of the variance that is left gives, and for each number no less than recordings disagree by, if that is more than chance.
 pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
     Normal::of(problem, fit, &fit.jacobian(problem)).covariance(fit.parameters().len())
-}
-
-/// The same, and from errors of the URDF's bodies: each mass and centre of mass is off by chance, all of them by the same
-/// share of a usual error, a variance component (Searle, Casella and `McCulloch`, *Variance Components*, 1992, chapter 5)
-/// that follows from what the residual has in common with their columns, and from the bodies that were fitted.
-pub fn covariance_beside_bodies(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
-    let mut columns = fit.jacobian(problem);
-    let own = columns.len();
-    columns.extend(usual_errors(problem, fit));
-    let normal = Normal::of(problem, fit, &columns);
-    let mut covariance = normal.covariance(own);
-    let bodies = normal.matrix.nrows() - own;
-    let Some(inverse) = normal.inverse(own).filter(|_| bodies > 0) else {
-        return covariance;
-    };
-    let shared = normal.matrix.view((0, own), (own, bodies));
-    // What a usual error of each body does to each number.
-    let pull = &inverse * shared;
-    let size = normal.size_of_errors(own, &pull, fitted_errors(problem, fit, &covariance));
-    covariance += &pull * pull.transpose() * (size * size);
-    covariance
-}
-
-/// The errors of masses and centres of mass that were fitted, in usual ones, as far as the noise lets them be told.
-fn fitted_errors(problem: &Problem, fit: &Fit, covariance: &DMatrix<f64>) -> Vec<f64> {
-    let of_coordinates = fit.actives.iter().flat_map(|active| {
-        let Hypothesis { effect, place } = active.hypothesis;
-        let off = effect
-            .traits
-            .off_in_urdf
-            .map(|off| off(&problem.model.links()[place.link]));
-        active.coordinates.iter().map(move |value| (value, off))
-    });
-    let told = |(k, (value, off)): (usize, (&f64, Option<f64>))| {
-        let off = off?;
-        (covariance[(k, k)] < off * off)
-            .then(|| (value * value - covariance[(k, k)]).max(0.0).sqrt() / off)
-    };
-    of_coordinates.enumerate().filter_map(told).collect()
 }
 
 /// The normal equations of a fit at its numbers, and how far chance moves their right side.
@@ -197,35 +151,6 @@ impl Normal {
         }
         covariance
     }
-
-    /// The error of bodies, in usual ones, that the residual has in common with their columns: the median over directions
-    /// in which bodies may be off and over the `fitted` errors, so that what else is left in some of them counts little.
-    /// `pull` is what a usual error of each does to the first `own` numbers, which were fitted.
-    fn size_of_errors(&self, own: usize, pull: &DMatrix<f64>, fitted: Vec<f64>) -> f64 {
-        let bodies = pull.ncols();
-        let shared = self.matrix.view((0, own), (own, bodies));
-        // What is left of each column beside those that were fitted. Their right side is zero.
-        let told = self.matrix.view((own, own), (bodies, bodies)) - shared.transpose() * pull;
-        let right = self.right.rows(own, bodies);
-        let mut left = DMatrix::zeros(bodies, own + bodies);
-        left.view_mut((0, 0), (bodies, own))
-            .copy_from(&-pull.transpose());
-        left.view_mut((0, own), (bodies, bodies))
-            .fill_with_identity();
-        let spread = &left * &self.spread * left.transpose();
-        let directions = SymmetricEigen::new(told);
-        // Of each direction that would show a usual error: the error that its right side tells of, less what chance adds.
-        let of_direction = |i: usize| {
-            let (told, way) = (directions.eigenvalues[i], directions.eigenvectors.column(i));
-            let by_chance = (way.transpose() * &spread * way)[0].max(told);
-            let beyond = (way.dot(&right).powi(2) - by_chance).max(0.0);
-            (told > 0.0 && told * told > by_chance).then(|| beyond.sqrt() / told)
-        };
-        let mut errors: Vec<f64> = (0..bodies).filter_map(of_direction).chain(fitted).collect();
-        errors.sort_by(f64::total_cmp);
-        let median = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
-        (median / MEDIAN_OF_ABS_NORMAL).min(LARGEST_ERROR)
-    }
 }
 
 /// Covariance of the sum of scores of `k` numbers, by track and row.
@@ -319,58 +244,5 @@ mod tests {
         assert!(deviation(0.6) < 0.02, "{}", deviation(0.6));
         // The mean of two numbers that are 0.4 apart.
         assert!((0.1..0.3).contains(&deviation(1.0)), "{}", deviation(1.0));
-    }
-
-    /// The normal equations of one number and five bodies, each direction of which tells a usual error of itself tenfold
-    /// its noise; `errors` is what the residual has of each.
-    fn beside(errors: [f64; 5]) -> Normal {
-        let mut right = DVector::zeros(6);
-        for (k, error) in errors.iter().enumerate() {
-            right[k + 1] = 100.0 * error;
-        }
-        Normal {
-            matrix: DMatrix::from_diagonal_element(6, 6, 100.0),
-            right,
-            spread: DMatrix::from_diagonal_element(6, 6, 100.0),
-            by_recording: DMatrix::zeros(6, 1),
-        }
-    }
-
-    fn size(errors: [f64; 5]) -> f64 {
-        beside(errors).size_of_errors(1, &DMatrix::zeros(1, 5), Vec::new())
-    }
-
-    #[test]
-    fn errors_of_bodies_are_told_by_what_most_directions_have_in_common_with_the_residual() {
-        let all = size([0.5, -0.3, 0.6, -0.4, 0.2]);
-        assert!((0.4..0.8).contains(&all), "{all}");
-        // Noise alone, and something else that is left in one direction.
-        assert!(size([0.1, -0.08, 0.05, -0.1, 0.02]) <= 0.0);
-        assert!(size([0.05, -0.08, 30.0, -0.1, 0.02]) <= 0.0);
-        assert!(size([9.0; 5]) >= LARGEST_ERROR);
-    }
-
-    #[test]
-    fn bodies_that_were_fitted_tell_how_far_the_others_are_off() {
-        let size = |fitted: &[f64]| {
-            let unseen = beside([0.0; 5]).size_of_errors(1, &DMatrix::zeros(1, 5), Vec::new());
-            let beside = beside([0.0; 5]).size_of_errors(1, &DMatrix::zeros(1, 5), fitted.to_vec());
-            assert!(unseen <= 0.0);
-            beside
-        };
-        // One link that is another beside five that are right; most of what can be told is off.
-        assert!(size(&[6.0]) <= 0.0);
-        assert!(size(&[0.8, 0.7, 0.9, 1.1, 0.6, 0.9]) > 0.5);
-    }
-
-    #[test]
-    fn bodies_as_in_the_urdf_hardly_widen_an_interval() {
-        let data = problem_with(3, |_, _, _| {});
-        let active = at_joint("viscous_friction", 0).with(vec![0.0]);
-        let fit = Fit::new(&data, vec![active]).refined(&data);
-        let half = |spread: &DMatrix<f64>| parameter_deviations(&data, &fit, spread, 0)[0];
-        let by_noise = half(&covariance(&data, &fit));
-        let with_bodies = half(&covariance_beside_bodies(&data, &fit));
-        assert!(with_bodies < 1.3 * by_noise, "{by_noise} {with_bodies}");
     }
 }

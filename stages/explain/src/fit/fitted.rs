@@ -99,22 +99,6 @@ impl Fit {
         likelihood(&self.variance, &self.count)
     }
 
-    /// The joints whose effort a hypothesis changes: one, or all.
-    pub fn joints_of(hypothesis: &Hypothesis, joints: usize) -> Vec<usize> {
-        hypothesis
-            .only_joint()
-            .map_or_else(|| (0..joints).collect(), |joint| vec![joint])
-    }
-
-    /// Gain in log-likelihood over another fit. `effective` holds the effective samples per row, by joint.
-    pub fn gain_over(&self, other: &Self, effective: &[f64]) -> f64 {
-        (0..self.variance.len())
-            .map(|j| {
-                0.5 * effective[j] * self.count[j] * (other.variance[j] / self.variance[j]).ln()
-            })
-            .sum()
-    }
-
     /// The effort that another effect would add.
     pub fn added(&self, problem: &Problem, active: &Active) -> Column {
         let on = (&self.parts.gains[..], self.parts.carrier.as_deref());

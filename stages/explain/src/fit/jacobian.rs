@@ -8,7 +8,6 @@ use tauscope_dynamics::terms::{CoordinateKind, Layer, PlaceKind, Scale};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
-use crate::data::work::OF_TERM_NS;
 use crate::fit::fitted::Fit;
 use crate::physics::active::Active;
 use crate::physics::efforts::record;
@@ -21,10 +20,6 @@ const SHAPE_STEP: f64 = 1e-5;
 /// Step of the difference quotient of a time \[s\].
 /// Tuned: by hand, one sample at 100 Hz, on no recorded seeds; not swept.
 const TIME_STEP_S: f64 = 0.01;
-
-/// What inverse dynamics cost for each joint and sample \[ns of one core\].
-/// Resolution: by the processor time of `explain` on one real arm and four simulated ones.
-const OF_ROBOT_NS: usize = 400;
 
 impl Fit {
     /// The coordinates that are free, as (index of the active, index of the coordinate).
@@ -83,24 +78,6 @@ impl Fit {
             joints.len() == self.variance.len()
                 || (at_joint && joints.contains(&hypothesis.place.joint))
         })
-    }
-
-    /// What the derivatives by some coordinates cost \[ns of one core\], roughly.
-    pub fn cost(&self, problem: &Problem, free: &[(usize, usize)]) -> usize {
-        let samples = problem.samples();
-        let one = |&(i, c): &(usize, usize)| {
-            let active = &self.actives[i];
-            let joints = active.hypothesis.only_joint().map_or(problem.joints, |_| 1);
-            let alike = is_kept(problem, active) && !active.is_of_record();
-            if active.hypothesis.is_torque_scale() || alike && self.is_factor(i, c) {
-                joints * problem.rows
-            } else if active.hypothesis.effect.traits.bends {
-                OF_ROBOT_NS * joints * samples
-            } else {
-                OF_TERM_NS * joints * samples
-            }
-        };
-        free.iter().map(one).sum()
     }
 
     /// How the explained effort changes with some coordinates of an active.

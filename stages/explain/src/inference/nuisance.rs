@@ -21,6 +21,8 @@ const INERTIA_SHARE: f64 = 0.1;
 const LAW_SHARE: f64 = 0.02;
 /// Usual error of a law of friction, as a share of the joint's friction. Chosen: as the other laws.
 const FRICTION_SHARE: f64 = 0.05;
+/// The same of another simulation's friction. Chosen: it is another's estimate of the same arm.
+const OTHER_FRICTION_SHARE: f64 = 0.2;
 /// Usual difference between the stamps of effort and position of one joint, apart from that of all \[s\], at least half a
 /// sample. Chosen: of the order of a controller's cycle.
 const STAMP_S: f64 = 0.001;
@@ -239,7 +241,9 @@ fn of_curves(
     all: &mut Vec<Nuisance>,
 ) {
     for curve in curves(problem, fit, joint) {
-        let deviation = if curve.is_friction {
+        let deviation = if curve.is_friction && problem.is_foreign {
+            OTHER_FRICTION_SHARE * size.friction
+        } else if curve.is_friction {
             FRICTION_SHARE * size.friction
         } else {
             LAW_SHARE * size.effort

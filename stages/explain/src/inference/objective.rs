@@ -10,13 +10,17 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use nalgebra::{DMatrix, DVector};
 
 use crate::data::column::Column;
-use crate::select::parallel;
+use crate::parallel;
 
+use super::prior::USUAL_SHARE;
 use super::space::{Measured, Space, Whitened};
 use super::variants::{Given, Variant};
 
 /// Correlation of two columns from which on one may take the place of the other. Resolution: changes the computing time.
 const RELATED: f64 = 0.3;
+
+/// Smallest square of an effort, as a share of the usual one. Resolution: of the rounding of efforts.
+const LEAST_SQUARE: f64 = 1e-18;
 
 /// An explanation: indices of variants, ascending.
 pub type Set = Vec<usize>;
@@ -74,6 +78,12 @@ impl<'a> Objective<'a> {
         offset.chain(factors).collect()
     }
 
+    /// Products of some columns with each other.
+    pub(super) fn products(&self, columns: &[Whitened]) -> DMatrix<f64> {
+        let m = columns.len();
+        DMatrix::from_fn(m, m, |a, b| self.space.product(&columns[a], &columns[b]))
+    }
+
     /// Adds variants, behind those that it has.
     pub fn extend(&mut self, given: Vec<Given>) {
         let whitened = parallel::map(&given, |given| self.whitened(given));
@@ -82,12 +92,9 @@ impl<'a> Objective<'a> {
             let at = self.columns.len();
             variant.offset = given.alone.is_some().then_some(at);
             variant.first = at + usize::from(given.alone.is_some());
-            let product = |a: &Whitened, b: &Whitened| self.space.product(a, b);
-            let m = columns.len();
-            self.squares.extend(columns.iter().map(|c| product(c, c)));
-            self.own.push(DMatrix::from_fn(m, m, |a, b| {
-                product(&columns[a], &columns[b])
-            }));
+            let own = self.products(&columns);
+            self.squares.extend(own.diagonal().iter());
+            self.own.push(own);
             self.columns.extend(columns);
             self.variants.push(variant);
         }
@@ -161,6 +168,15 @@ impl<'a> Objective<'a> {
         let (mean, inverse) = mean_and_inverse(base);
         let mut at = 0;
         for &v in &base.set {
+            let q = self.variants[v].deviations.len();
+            let half = inverse.rows(at, q);
+            let covariance = half * half.transpose();
+            score += self.log_size(
+                &self.variants[v],
+                &self.own[v],
+                &mean.rows(at, q).into_owned(),
+                &covariance,
+            );
             for positive in &self.variants[v].positive {
                 if *positive {
                     let deviation = inverse.row(at).norm();
@@ -234,23 +250,22 @@ impl<'a> Objective<'a> {
     }
 
     /// Gain in value by adding a variant to a set \[nats\], from the products of its residual columns: `own` with each
-    /// other, `right` with the residual of the measurement. The offset comes first, if it has one.
+    /// other, `right` with the residual of the measurement. The offset comes first, if it has one. `gram` are the products
+    /// of the columns themselves.
     pub(super) fn gain(
+        &self,
         variant: &Variant,
-        has_offset: bool,
+        gram: &DMatrix<f64>,
         own: &DMatrix<f64>,
         right: &DVector<f64>,
     ) -> f64 {
-        let offset = usize::from(has_offset);
+        let q = variant.deviations.len();
+        let offset = right.len() - q;
         let mut right = right.clone();
         let mut gain = variant.log_prior;
         if offset == 1 {
             gain += right[0] - 0.5 * own[(0, 0)];
             right -= own.column(0);
-        }
-        let q = right.len() - offset;
-        if q == 0 {
-            return gain;
         }
         let mut normal = own.view((offset, offset), (q, q)).into_owned();
         for i in 0..q {
@@ -262,17 +277,60 @@ impl<'a> Objective<'a> {
         let right = right.rows(offset, q).into_owned();
         let mean = factor.solve(&right);
         gain += 0.5 * right.dot(&mean);
-        let lower = factor.l_dirty();
-        gain -= lower.diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        if variant.positive.contains(&true) {
-            let inverse = factor.inverse();
-            for (k, positive) in variant.positive.iter().enumerate() {
-                if *positive {
-                    gain += log_twice_share_above_zero(mean[k] / inverse[(k, k)].sqrt());
-                }
+        gain -= factor
+            .l_dirty()
+            .diagonal()
+            .iter()
+            .map(|d| d.ln())
+            .sum::<f64>();
+        let inverse = factor.inverse();
+        for (k, positive) in variant.positive.iter().enumerate() {
+            if *positive {
+                gain += log_twice_share_above_zero(mean[k] / inverse[(k, k)].sqrt());
             }
         }
-        gain
+        gain + self.log_size(variant, gram, &mean, &inverse)
+    }
+
+    /// Logarithm of the square of a variant's effort, over that which its prior expects: a moment prior, under which an
+    /// effect without effort is no effect (Johnson and Rossell, "On the use of non-local prior densities in Bayesian
+    /// hypothesis tests", *Journal of the Royal Statistical Society* B 72, 2010). `gram` are the products of its columns,
+    /// offset first; `mean` and `covariance` are those of its scaled factors. A shape is expected to have the usual share of the
+    /// effort of the joints that feel it.
+    fn log_size(
+        &self,
+        variant: &Variant,
+        gram: &DMatrix<f64>,
+        mean: &DVector<f64>,
+        covariance: &DMatrix<f64>,
+    ) -> f64 {
+        if variant.is_forced {
+            return 0.0;
+        }
+        let q = mean.len();
+        let offset = gram.nrows() - q;
+        let mean = &DVector::from_fn(q, |k, _| {
+            if variant.positive[k] {
+                mean[k].max(0.0)
+            } else {
+                mean[k]
+            }
+        });
+        let of_factors = gram.view((offset, offset), (q, q));
+        let mut square =
+            mean.dot(&(of_factors * mean)) + of_factors.component_mul(covariance).sum();
+        let mut usual = of_factors.trace();
+        if offset == 1 {
+            let cross = gram.view((1, 0), (q, 1));
+            square += gram[(0, 0)] + 2.0 * mean.dot(&cross.column(0));
+            let only = variant.hypothesis.only_joint();
+            let efforts = self.space.effort_squares.iter().enumerate();
+            let felt = efforts.filter(|(joint, _)| only.is_none_or(|only| only == *joint));
+            usual += USUAL_SHARE * USUAL_SHARE * felt.map(|(_, square)| square).sum::<f64>();
+        }
+        (square / usual.max(f64::MIN_POSITIVE))
+            .max(LEAST_SQUARE)
+            .ln()
     }
 }
 
@@ -308,4 +366,42 @@ fn share_below(z: f64) -> f64 {
                 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
     let tail = (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt() * series;
     if z > 0.0 { 1.0 - tail } else { tail.max(1e-12) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::fitted::Fit;
+    use crate::fixture::{at_joint, problem_with};
+    use crate::inference::nuisance;
+    use crate::inference::state::State;
+    use crate::inference::variants;
+
+    /// The gain by viscous friction that is measured as `share` of its usual size, whatever the noise is.
+    fn gain(share: f64) -> f64 {
+        let problem = problem_with(3, |_, qd, effort| effort[0] += 1.2 * qd[0]);
+        let mut state = State::new(&problem, true);
+        let fit = Fit::new(&problem, Vec::new());
+        let sizes = state.sizes(&fit);
+        let nuisances = nuisance::of(&problem, &fit, &sizes, true, state.scales);
+        let friction = [at_joint("viscous_friction", 0)];
+        let mut given = variants::all(&problem, &fit, &friction, &state.efforts);
+        given.truncate(1);
+        let measured = variants::measured(&problem, &fit);
+        state.estimate_noise(&fit, &nuisances, &given, &measured, true);
+        let space = state.space(&nuisances);
+        let objective = Objective::new(&space, &measured, given);
+        let (own, gram) = (DMatrix::from_element(1, 1, 1e6), &objective.own[0]);
+        let right = DVector::from_element(1, 1e6 * share);
+        objective.gain(&objective.variants[0], gram, &own, &right) - 0.5 * 1e6 * share * share
+    }
+
+    /// Beside the likelihood, the logarithm of the square of the size decides.
+    #[test]
+    fn an_effect_of_a_hundredth_of_its_usual_size_is_ten_thousand_times_less_likely_beforehand() {
+        let less = gain(1.0) - gain(1e-2);
+        assert!((less - 2.0 * 100_f64.ln()).abs() < 0.1, "{less}");
+        // What is not there is as unlikely as what the noise allows.
+        assert!(gain(0.0) < gain(1e-2) - 2.0);
+    }
 }

@@ -34,12 +34,7 @@ pub struct Solution {
 pub fn refine(problem: &Problem, space: &Space, start: Fit, deviations: &[f64]) -> Solution {
     let mut fit = start;
     let free = fit.parameters();
-    let prior = DVector::from_iterator(
-        free.len(),
-        deviations
-            .iter()
-            .map(|d| if d.is_finite() { 1.0 / (d * d) } else { 0.0 }),
-    );
+    let prior = precisions(deviations);
     let numbers = |fit: &Fit| {
         DVector::from_iterator(
             free.len(),
@@ -93,6 +88,27 @@ pub fn refine(problem: &Problem, space: &Space, start: Fit, deviations: &[f64]) 
         covariance,
         nuisances,
     }
+}
+
+/// Covariance of all coordinates of a fit, in the order of [`Fit::parameters`]. `deviations` as in [`refine`].
+pub fn covariance(problem: &Problem, space: &Space, fit: &Fit, deviations: &[f64]) -> DMatrix<f64> {
+    let jacobian = fit.jacobian(problem);
+    let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
+    let residual = Column {
+        joint: None,
+        values: fit.residual.clone(),
+    };
+    let mut normal = space.products(&columns, &residual).normal;
+    for (i, precision) in precisions(deviations).iter().enumerate() {
+        normal[(i, i)] += precision;
+    }
+    inverse(&normal)
+}
+
+/// Precisions of priors with these standard deviations.
+fn precisions(deviations: &[f64]) -> DVector<f64> {
+    let of = |d: &f64| if d.is_finite() { 1.0 / (d * d) } else { 0.0 };
+    DVector::from_iterator(deviations.len(), deviations.iter().map(of))
 }
 
 /// A step of Gauss and Newton within the bounds, shortened until it gains.

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_dynamics::terms::PlaceKind;
 
+use crate::parallel;
 use crate::physics::active::Hypothesis;
-use crate::select::parallel;
 
 use super::around::Around;
 use super::objective::{Objective, Set};

@@ -12,8 +12,8 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::fit::jacobian::step_of;
 use crate::fit::refine::bounds;
+use crate::parallel;
 use crate::physics::active::Hypothesis;
-use crate::select::parallel;
 
 use super::around::Around;
 use super::objective::{Objective, Set};
@@ -160,8 +160,10 @@ impl Search<'_> {
             self.count,
             self.efforts,
         )?;
-        let (own, right) = self.beside.products(&self.objective.whitened(&given));
-        let gain = Objective::gain(&given.variant, given.alone.is_some(), &own, &right);
+        let whitened = self.objective.whitened(&given);
+        let (own, right) = self.beside.products(&whitened);
+        let gram = self.objective.products(&whitened);
+        let gain = self.objective.gain(&given.variant, &gram, &own, &right);
         Some((given, gain))
     }
 

@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::least_squares::dot;
-use crate::select::parallel;
+use crate::parallel;
 
 use super::noise::Whitener;
 use super::rows::Rows;
@@ -40,6 +40,8 @@ pub struct Space {
     pub(super) nuisances: Vec<(Option<usize>, Vec<f64>)>,
     factor: Cholesky<f64, Dyn>,
     rows_of_problem: usize,
+    /// Square of each joint's measured effort, whitened.
+    pub(super) effort_squares: Vec<f64>,
 }
 
 impl Space {
@@ -62,7 +64,15 @@ impl Space {
             nuisances: Vec::new(),
             factor: Cholesky::new(DMatrix::identity(1, 1)).unwrap_or_else(|| unreachable!()),
             rows_of_problem: problem.rows,
+            effort_squares: Vec::new(),
         };
+        let of_joint = |joint: usize| {
+            let values = problem.measured[problem.joint_rows(joint)].to_vec();
+            let joint = Some(joint);
+            let own = space.whitened(&Column { joint, values }, 1.0);
+            dot(&own, &own)
+        };
+        space.effort_squares = (0..problem.joints).map(of_joint).collect();
         space.nuisances = parallel::map(nuisances, |c| (c.joint, space.whitened(c, 1.0)));
         let products = parallel::map(&(0..count).collect::<Vec<_>>(), |&a| {
             let own = &space.nuisances[a];

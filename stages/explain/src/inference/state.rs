@@ -20,9 +20,8 @@ use super::space::Space;
 use super::temper;
 use super::variants::{self, Given};
 
-/// Candidate scales of the errors of bodies, in usual errors. Resolution: of an estimate that some ten bodies allow, and that the heavy ones
-/// decide: light ones may be off by more.
-const BODY_SCALES: [f64; 3] = [0.55, 1.0, 1.8];
+/// Candidate scales of the errors of bodies, in usual errors. Resolution: of an estimate that some ten bodies allow.
+const BODY_SCALES: [f64; 5] = [0.1, 0.3, 0.55, 1.0, 1.8];
 /// Candidate scales of the errors of laws, in usual errors. Chosen: no law is truer than one percent of a joint's effort.
 const LAW_SCALES: [f64; 2] = [0.55, 1.0];
 /// Weight of the usual errors against an estimate: twice the squared logarithm of the scale is taken off \[nats\].
@@ -36,7 +35,8 @@ const LEAST_ROWS: usize = 20;
 /// Estimates that accompany an explanation.
 pub struct State<'a> {
     problem: &'a Problem,
-    bodies: bool,
+    /// Whether the robot's bodies are known.
+    pub bodies: bool,
     rows: Vec<Rows>,
     /// Each joint's measured effort.
     pub efforts: Vec<Magnitude>,
@@ -77,6 +77,7 @@ impl<'a> State<'a> {
         }
     }
 
+    /// The space with these nuisances.
     pub fn space(&self, nuisances: &[Nuisance]) -> Space {
         let of = |joint: usize| {
             let filter = Whitener::new(&self.rows[joint], &self.noises[joint], &self.extra[joint]);
@@ -147,8 +148,7 @@ impl<'a> State<'a> {
             let given = variants::of_fit(problem, fit, &state.efforts);
             let own = Objective::new(&space, &measured, given);
             let all: Set = (0..own.variants.len()).collect();
-            let prior: f64 = scales.iter().map(|s| SCALE_WEIGHT * s.ln().powi(2)).sum();
-            space.evidence(&measured) + own.score(&all) - prior
+            space.evidence(&measured) + own.score(&all) - disfavour(scales)
         };
         for which in (0..2).filter(|which| *which == 1 || self.bodies) {
             let with = |scale: f64| {
@@ -213,6 +213,11 @@ impl<'a> State<'a> {
     }
 }
 
+/// Logarithm of the prior of usual errors over that of `scales` \[nats\].
+pub fn disfavour(scales: [f64; 2]) -> f64 {
+    scales.iter().map(|s| SCALE_WEIGHT * s.ln().powi(2)).sum()
+}
+
 /// Root mean square of the friction in a rough fit of one joint: Coulomb and viscous friction, inertia, load and an offset by
 /// least squares.
 fn friction_rms(problem: &Problem, fit: &Fit, rows: &Rows, joint: usize) -> f64 {
@@ -234,8 +239,13 @@ fn friction_rms(problem: &Problem, fit: &Fit, rows: &Rows, joint: usize) -> f64 
     let matrix = DMatrix::from_fn(count, 5, |k, c| {
         columns.get(c).map_or(1.0, |column| column[k])
     });
-    let measured = variants::measured(problem, fit);
-    let y = DVector::from_vec(rows.pick(&measured.values[problem.joint_rows(joint)]));
+    // Another simulation's effort has friction, too: what is left of it is a share of all friction.
+    let y = if problem.is_foreign {
+        rows.pick(&problem.measured[problem.joint_rows(joint)])
+    } else {
+        rows.pick(&variants::measured(problem, fit).values[problem.joint_rows(joint)])
+    };
+    let y = DVector::from_vec(y);
     let normal = matrix.tr_mul(&matrix);
     let Some(x) = solved(&normal, &matrix.tr_mul(&y), &[true; 5], 1e-6) else {
         return 0.0;

@@ -32,22 +32,39 @@ pub struct Step<'a> {
     pub here: f64,
 }
 
+/// What a step reaches.
+pub struct Taken {
+    /// The set.
+    pub set: Set,
+    /// Its refined numbers.
+    pub solution: Solution,
+    /// Its value \[nats\].
+    pub value: f64,
+    /// Whether it lacks some of what was found.
+    pub is_shortened: bool,
+}
+
 impl Step<'_> {
-    /// The set that is reached, its refined numbers, and whether it lacks some of what was found.
-    pub fn taken(&self, own: &Set, found: Set) -> (Set, Solution, bool) {
+    /// What is reached on the way from a set to the set that was found.
+    pub fn taken(&self, own: &Set, found: Set) -> Taken {
         let score = |set: &Set| self.objective.score(set);
         let mut added: Vec<(f64, usize)> = (found.iter().filter(|v| !own.contains(v)))
             .map(|&v| (score(&search::without(&found, v)), v))
             .collect();
         added.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (mut set, mut first, mut count) = (found, 0, added.len());
+        let (mut set, mut first, mut count) = (found.clone(), 0, added.len());
         loop {
             let (solution, value) = self.refined(&set);
             let predicted = score(&set) - score(own);
             let gained = value - self.here;
             let is_shortened = first > 0 || count < added.len();
             if count == 0 || gained >= TRUSTED * predicted {
-                return (set, solution, is_shortened);
+                return Taken {
+                    set,
+                    solution,
+                    value,
+                    is_shortened,
+                };
             }
             if count > 1 {
                 count /= 2;
@@ -55,10 +72,23 @@ impl Step<'_> {
                 first += 1;
                 count = usize::from(first < added.len());
             }
-            set.clone_from(own);
-            set.extend(added[first..].iter().take(count).map(|(_, v)| *v));
-            set.sort_unstable();
+            let newcomers: Set = (added[first..].iter().take(count))
+                .map(|(_, v)| *v)
+                .collect();
+            set = self.joined(own, &found, newcomers);
         }
+    }
+
+    /// A set with some of the newcomers of `found`, without what they exclude.
+    fn joined(&self, own: &Set, found: &Set, newcomers: Set) -> Set {
+        let variant = |v: usize| &self.objective.variants[v];
+        let stays = |v: &usize| {
+            found.contains(v) || !newcomers.iter().any(|&w| variant(w).excludes(variant(*v)))
+        };
+        let mut set: Set = own.iter().copied().filter(stays).collect();
+        set.extend(newcomers);
+        set.sort_unstable();
+        set
     }
 
     /// The refined numbers of a set, without the effects that they leave nothing to do, and its value.

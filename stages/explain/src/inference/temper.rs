@@ -27,26 +27,29 @@ pub fn tempers(
     weights: &[f64],
 ) -> Vec<f64> {
     let of = |(joint, weight): (usize, &f64)| {
-        let (mut square, mut freedom) = (0.0, 0.0);
         let own: Vec<Vec<Vec<f64>>> = (features.iter().filter(|f| f.joint == joint))
             .flat_map(|f| &f.columns)
             .map(|column| space.whitened_by_piece(joint, column, pieces))
             .collect();
-        for piece in 0..pieces {
+        let of_piece = |piece: usize| {
             let residual = left_out.residual(joint, piece);
             let features = DMatrix::from_fn(residual.len(), own.len(), |k, c| own[c][piece][k]);
             let covariance = left_out.covariance(joint, piece, &features);
             let eigen = SymmetricEigen::new(covariance);
             let products = eigen.eigenvectors.tr_mul(&features.tr_mul(&residual));
             let least = DEPENDENT * eigen.eigenvalues.max();
+            let (mut square, mut freedom) = (0.0, 0.0);
             for (variance, product) in eigen.eigenvalues.iter().zip(products.iter()) {
                 if *variance > least && least > 0.0 {
                     square += product * product / variance;
                     freedom += 1.0;
                 }
             }
-        }
-        let dispersion = if freedom > 0.0 { square / freedom } else { 1.0 };
+            (freedom > 0.0).then_some(square / freedom)
+        };
+        let mut dispersions: Vec<f64> = (0..pieces).filter_map(of_piece).collect();
+        dispersions.sort_by(f64::total_cmp);
+        let dispersion = dispersions.get(dispersions.len() / 2).map_or(1.0, |d| *d);
         (weight / dispersion).clamp(LEAST, 1.0)
     };
     weights.iter().enumerate().map(of).collect()

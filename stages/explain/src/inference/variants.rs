@@ -7,11 +7,11 @@ use tauscope_dynamics::terms::CoordinateKind;
 use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
+use crate::parallel;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::physics::friction::least;
-use crate::select::grid::shapes;
-use crate::select::parallel;
-use crate::select::propose::Base;
+use crate::propose::base::Base;
+use crate::propose::grid::shapes;
 
 use super::curves::{self, Curve};
 use super::prior::{self, Magnitude};

@@ -138,28 +138,6 @@ impl Hypothesis {
         self.effect.traits.shifts_time
     }
 
-    /// Whether it shifts the zero of a joint.
-    pub fn is_zero_offset(&self) -> bool {
-        self.effect.family == Family::Mounting && self.effect.place == PlaceKind::Joint
-    }
-
-    /// Whether it is a function of its joint's position alone.
-    pub fn is_of_position(&self) -> bool {
-        self.effect.traits.drawn_over == Some(Against::Position)
-    }
-
-    /// Whether it is a spring over its joint's position.
-    pub fn is_spring(&self) -> bool {
-        self.is_of_position()
-            && self.effect.family == Family::Spring
-            && self.effect.traits.most_at_one_place == 1
-    }
-
-    /// Whether it is a wave over its joint's position, of which there may be several.
-    pub fn is_wave(&self) -> bool {
-        self.is_of_position() && self.effect.traits.most_at_one_place > 1
-    }
-
     /// How it depends on time.
     pub fn time_kind(&self) -> TimeKind {
         self.effect.time()
@@ -236,20 +214,6 @@ impl Active {
         (0..curve.knots.len()).map(&mut value).collect()
     }
 
-    /// Whether it is a curve over its joint's own velocity, which is friction.
-    pub fn is_friction_curve(&self) -> bool {
-        let curve = self.curve.as_ref();
-        curve.is_some_and(|curve| curve.is_friction_of(self.hypothesis.place.joint))
-    }
-
-    /// Whether its effort jumps where its joint reverses.
-    pub fn is_set_valued(&self, model: &Model) -> bool {
-        match &self.curve {
-            Some(curve) => curve.by_direction,
-            None => self.hypothesis.is_set_valued(model),
-        }
-    }
-
     /// Whether it depends on what the gear transmits.
     pub fn needs_load(&self) -> bool {
         match &self.curve {
@@ -291,11 +255,6 @@ impl Active {
             return Some((link + ten, Some(link)));
         }
         self.hypothesis.is_body().then_some((ten, None))
-    }
-
-    /// Whether it only describes the mismatch: a curve, or a body without a named cause.
-    pub fn is_unnamed(&self) -> bool {
-        self.curve.is_some() || self.hypothesis.is_unnamed_body()
     }
 
     /// Whether it is a curve over the time since a start that another run does not share.
@@ -378,7 +337,7 @@ mod tests {
             coordinates: vec![3.0, 4.0],
             curve: Some(curve.clone()),
         };
-        assert!(active.is_friction_curve());
+        assert!(curve.is_friction_of(2));
         let values = active.values_at_knots(&curve);
         assert_eq!(values, [0.0, 3.0, 0.0, 0.0, 4.0, 0.0]);
         let of_another = Table {

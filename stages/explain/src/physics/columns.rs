@@ -24,9 +24,7 @@ pub fn columns(
     let gains = &parts.gains;
     let body = hypothesis.effect.layer == Layer::Body;
     let plain = parts.is_plain(&hypothesis);
-    if !plain || hypothesis.needs_load() || problem.rows > MOST_ROWS {
-        count(problem, actives, hypothesis);
-    }
+    if !plain || hypothesis.needs_load() || problem.rows > MOST_ROWS {}
     if hypothesis.needs_load() && plain {
         let efforts = Efforts::of_bodies(parts.load(problem, actives));
         return Arc::new(computed(problem, &[], &efforts, hypothesis, shape, gains));
@@ -55,21 +53,6 @@ pub fn columns(
         alone: units.alone.as_ref().map(scale),
         factors: units.factors.iter().map(|c| Arc::new(scale(c))).collect(),
     })
-}
-
-/// Counts what it takes to compute a hypothesis' columns: once without its factors and once with each of them, at each joint,
-/// and through what transforms the recording of one.
-fn count(problem: &Problem, actives: &[Active], hypothesis: Hypothesis) {
-    let own = hypothesis.only_joint();
-    let is_passed = |active: &&Active| {
-        let other = active.hypothesis.only_joint();
-        active.is_of_record() && (own.is_none() || other.is_none() || own == other)
-    };
-    let passed = actives.iter().filter(is_passed).count();
-    let joints = own.map_or(problem.joints, |_| 1);
-    let passes = 1 + hypothesis.factors().len();
-    let evaluations = passes * (joints + passed) * problem.samples();
-    problem.work.add_terms(evaluations);
 }
 
 /// The columns of an effect on bodies where effects of the recording transform some joints' efforts.

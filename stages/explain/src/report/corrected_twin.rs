@@ -6,7 +6,6 @@ use crate::context::Context;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, TimeKind};
 use crate::physics::{friction, torque_scale};
-use crate::report::handed_out::Withheld;
 
 impl Context<'_> {
     /// Gain of each joint's bodies in the corrected twin, and its standard deviation. `fitted` are the standard deviations
@@ -59,15 +58,17 @@ impl Context<'_> {
         bodies.map(|active| self.spec(active)).collect()
     }
 
-    /// The terms of the corrected twin: all but temporary effects, curves over time and those `withheld`.
-    pub fn lasting_terms(&self, found: &Fit, withheld: &[Withheld]) -> Vec<TermSpec> {
+    /// The terms of the corrected twin: all but temporary effects, curves over time, and those of the joints that are `kept`
+    /// as they were.
+    pub fn lasting_terms(&self, found: &Fit, kept: &[usize]) -> Vec<TermSpec> {
         let mut terms = self
             .input
             .start
             .as_ref()
             .map_or_else(Vec::new, |start| start.terms.clone());
-        for (index, active) in found.actives.iter().enumerate() {
-            let is_withheld = withheld.iter().any(|withheld| withheld.effect == index);
+        for active in &found.actives {
+            let is_withheld =
+                (active.hypothesis.only_joint()).is_some_and(|joint| kept.contains(&joint));
             let is_kept = active.hypothesis.effect.traits.in_session
                 && self.spec(active).effect != active.hypothesis.effect.name;
             let lasts = is_kept || active.hypothesis.lasts() && !active.is_curve_over_time();

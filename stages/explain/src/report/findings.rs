@@ -1,18 +1,13 @@
 //! From the chosen explanation to findings with intervals, rivals and smallest effects that could be found.
 
 mod clipping;
-mod confidence;
-mod contest;
-mod doubt;
 mod far_out;
-mod inferred;
 mod lighter_body;
 mod odd_robot;
 mod rivals;
 mod scales;
 mod sizes;
 mod undetectable;
-mod unsure;
 mod waves;
 
 use std::collections::BTreeMap;
@@ -22,33 +17,29 @@ use tauscope_dynamics::terms::PlaceKind;
 
 use crate::context::Context;
 use crate::data::problem::Problem;
-use crate::fit::covariance::{covariance, covariance_beside_bodies};
 use crate::fit::fitted::Fit;
 use crate::fit::interval::{half_width_95, parameter_deviations};
-use crate::fit::untold::untold;
+use crate::inference::Inferred;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::physics::friction::least;
 use crate::read::input::Input;
 use crate::report::schema::{Finding, NextMotion, Rejected, Rival};
 use crate::report::sentences;
-use crate::select::explanation::Explanation;
-use crate::select::search::Search;
 
 use clipping::is_clipped;
-use confidence::{Grounds, confidence};
-use contest::contest;
-use doubt::DOUBTED;
-pub use doubt::doubt_patches;
-pub use inferred::of_inferred;
+use odd_robot::{imitates, oddities};
 use scales::{Scales, StartScales};
 use sizes::{effort_rms, mismatch};
 pub use undetectable::undetectable;
-use unsure::{ALIKE, alike, surest};
 use waves::merge_waves;
 
 /// A time with a larger standard deviation than this has no interval \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const VAGUE_S: f64 = 5.0;
+
+/// How the log-odds of a finding grow with the logarithm of one plus its margin: they are even without a margin. Chosen: with
+/// arms of another hand in view; a calibration on seeds of its own is to replace it.
+const LOG_ODDS: f64 = 0.6;
 
 /// The findings of an explanation, and what belongs to them.
 #[derive(Debug, Default)]
@@ -68,18 +59,6 @@ pub struct Named {
 }
 
 impl Named {
-    /// Adds to each finding what its size and the other findings say of it, and puts the largest first. `actives` are the
-    /// effects of the findings, in their order.
-    fn judge(&mut self, problem: &Problem, actives: &[Active]) {
-        for finding in &mut self.findings {
-            lighter_body::tell_share(finding, &problem.model);
-        }
-        doubt::doubt(self, problem, actives);
-        merge_waves(&mut self.findings);
-        self.findings
-            .sort_by(|a, b| b.explains.total_cmp(&a.explains));
-    }
-
     /// Adds the findings of another explanation.
     pub fn extend(&mut self, other: Self) {
         self.findings.extend(other.findings);
@@ -120,23 +99,18 @@ fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
     }
 }
 
-/// The findings for every effect in `found`.
+/// The findings of an inferred explanation.
 pub fn of(
-    search: &Search<'_>,
-    found: &Explanation,
+    problem: &Problem,
+    inferred: &Inferred,
     before: &Fit,
     context: &Context<'_>,
     joints: &[String],
 ) -> Named {
-    let (input, fit, unit_nm) = (context.input, &found.fit, context.unit_nm);
-    let effective = &search.problem.effective_samples;
-    let by_noise = covariance(search.problem, fit);
-    let beside_bodies = (input.bodies).then(|| covariance_beside_bodies(search.problem, fit));
-    let spread = beside_bodies.as_ref().unwrap_or(&by_noise);
-    let untold = untold(search.problem, fit);
+    let (input, fit, unit_nm) = (context.input, &inferred.fit, context.unit_nm);
     let total = mismatch(before, fit, before);
     let share = |less: &Fit| (mismatch(less, fit, before) / total).clamp(0.0, 1.0);
-    let scales = Scales::of(search.problem, fit, &by_noise);
+    let scales = Scales::of(problem, fit, &inferred.covariance);
     let of_start = StartScales::of(input);
     let mut named = Named {
         notes: scales.notes(joints),
@@ -147,36 +121,23 @@ pub fn of(
         if active.hypothesis.is_torque_scale() {
             continue;
         }
-        let deviations = parameter_deviations(search.problem, fit, spread, index);
-        let by_noise = parameter_deviations(search.problem, fit, &by_noise, index);
-        let less = search.without(found, index);
-        let evidence = found.ahead_of(&less, effective);
-        let contest = contest(search, found, &less, active);
-        let most = surest(search.problem, active, &deviations, &by_noise);
-        let alike = alike(search.problem, active, &deviations);
-        let (active, deviations, contest, most) = match &alike {
-            Some((plain, both)) => (plain, both, contest.told_as(plain, active), most.min(ALIKE)),
-            None => (active, &deviations, contest, most),
-        };
-        let known = (&deviations[..], &untold[index][..]);
-        let (mut parameters, mut intervals) = numbers(search.problem, fit, active, known, joints);
+        let deviations = parameter_deviations(problem, fit, &inferred.covariance, index);
+        let less = fit.without(problem, index);
+        let (mut parameters, mut intervals) = numbers(problem, fit, active, &deviations, joints);
         let (joint, link) = place_of(input, joints, &active.hypothesis);
         let place = link.clone().or_else(|| joint.clone()).unwrap_or_default();
-        let when = when(search, active, &mut parameters, &mut intervals);
+        let when = when(problem, active, &mut parameters, &mut intervals);
         drop_no_force(&mut parameters, &mut intervals);
         far_out::drop_nowhere(&mut parameters, &mut intervals);
         let in_amperes = scales.to_nm(active.hypothesis, &mut parameters, &mut intervals);
         of_start.widen(active.hypothesis, &parameters, &mut intervals);
-        let or_scale = scales.doubt_body(active.hypothesis, &parameters, &mut intervals);
         let of = (place.as_str(), when.recording.as_deref());
         let mut sentence = sentences::sentence(active, of, &parameters, &intervals, joints);
-        sentence += or_scale.unwrap_or_default();
         let slides = active.hypothesis.slides(&input.model);
         sentence = sentences::in_units(&sentence, in_amperes, slides);
-        let equivalent_to = named.keep_rivals(active, contest, input, joints);
-        let (explains, effort_rms) = (share(&less.fit), effort_rms(&less.fit, fit, unit_nm));
-        let (bare, of_both) = without_twin(search, found, less, index, evidence);
-        let grounds = Grounds::of(fit, &bare.fit, active, of_both);
+        let margin = inferred.margins[index];
+        let others = &inferred.alternatives[index];
+        let equivalent_to = named.keep_rivals(active, margin, others, input, joints);
         named.findings.push(Finding {
             effect: active.hypothesis.said().to_owned(),
             joint,
@@ -185,40 +146,36 @@ pub fn of(
             intervals_95: intervals,
             in_amperes,
             slides,
-            confidence: confidence(grounds).min(or_scale.map_or(most, |_| DOUBTED)),
+            confidence: confidence_of(margin),
             recording: when.recording,
             t_start: when.start,
             t_end: when.end,
-            explains,
-            over_rest: grounds.over_rest,
-            evidence_nats: evidence,
-            effort_rms,
+            explains: share(&less),
+            over_rest: 0.0,
+            evidence_nats: margin,
+            effort_rms: effort_rms(&less, fit, unit_nm),
             equivalent_to,
             sentence,
         });
     }
-    named.judge(search.problem, &fit.actives);
+    for finding in &mut named.findings {
+        lighter_body::tell_share(finding, &problem.model);
+        finding.sentence += far_out::far_out(finding, &problem.model).unwrap_or_default();
+    }
+    merge_waves(&mut named.findings);
+    // What the bodies' errors would look like is no more certain than they are.
+    if fit.actives.iter().any(|a| imitates(a.hypothesis.effect)) {
+        named.notes.extend(oddities(&input.model));
+    }
+    named
+        .findings
+        .sort_by(|a, b| b.explains.total_cmp(&a.explains));
     named
 }
 
-/// An explanation that lacks the effect at `index` in `found`, and the evidence for the effect: `less` and its `evidence`,
-/// or, where the effect is one of two waves, without the other one as well. The two are one finding, and without the one
-/// the other would take its place in part.
-fn without_twin(
-    search: &Search<'_>,
-    found: &Explanation,
-    less: Explanation,
-    index: usize,
-    evidence: f64,
-) -> (Explanation, f64) {
-    let own = found.fit.actives[index].hypothesis;
-    let twin = less.fit.actives.iter().position(|a| a.hypothesis == own);
-    let Some(twin) = twin.filter(|_| own.is_wave()) else {
-        return (less, evidence);
-    };
-    let bare = search.without(&less, twin);
-    let of_both = found.ahead_of(&bare, &search.problem.effective_samples);
-    (bare, of_both)
+/// Confidence of a finding by its margin \[nats\]: what the explanation loses without it.
+fn confidence_of(margin: f64) -> f64 {
+    1.0 / (1.0 + (-LOG_ODDS * margin.max(0.0).ln_1p()).exp())
 }
 
 /// The numbers of an effect by name, and their 95 % intervals.
@@ -226,15 +183,14 @@ fn numbers(
     problem: &Problem,
     fit: &Fit,
     active: &Active,
-    (deviations, untold): (&[f64], &[bool]),
+    deviations: &[f64],
     joints: &[String],
 ) -> (BTreeMap<String, Value>, BTreeMap<String, [f64; 2]>) {
     let (mut parameters, mut intervals) = (BTreeMap::new(), BTreeMap::new());
     let effect = active.hypothesis.effect;
     let values = active.parameters();
     let all = effect.parameters.iter().zip(&values);
-    let all = all.zip(deviations).zip(untold);
-    for ((parameter, value), deviation) in all.filter(|(_, untold)| !**untold).map(|(one, _)| one) {
+    for ((parameter, value), deviation) in all.zip(deviations) {
         parameters.insert(parameter.name.to_owned(), number(*value));
         // The time of a change between two recordings is not known any better.
         let vague = parameter.name.starts_with("change_time") && *deviation > VAGUE_S;
@@ -313,7 +269,7 @@ struct When {
 
 /// The times of a finding. Where they hold for one recording, its parameters are changed to that recording's time.
 fn when(
-    search: &Search<'_>,
+    problem: &Problem,
     active: &Active,
     parameters: &mut BTreeMap<String, Value>,
     intervals: &mut BTreeMap<String, [f64; 2]>,
@@ -337,7 +293,7 @@ fn when(
             };
             if active.hypothesis.effect.traits.in_session {
                 // An end that is none has no interval.
-                let (first_s, last_s) = search.problem.session_s();
+                let (first_s, last_s) = problem.session_s();
                 let within = |t: f64| t.clamp(first_s, last_s);
                 for (name, t) in [("t_start_s", start), ("t_end_s", end)] {
                     if t < first_s || t > last_s {
@@ -352,8 +308,7 @@ fn when(
                 };
             }
             let middle = 0.5 * (start + end);
-            let track = search
-                .problem
+            let track = problem
                 .tracks
                 .iter()
                 .map(|track| &track.track)

@@ -9,7 +9,7 @@ use crate::fit::fitted::{Fit, LEAST_VARIANCE};
 use crate::physics::active::{Active, in_order};
 use crate::physics::carrier::is_on_carrier;
 use crate::read::recording::Recording;
-use crate::report::handed_out::{self, HeldOut, Withheld};
+use crate::report::handed_out::not_carried;
 use crate::report::schema::{JointPicture, RecordingPicture};
 
 /// Cutoffs that are tried for the motion of a prediction, as shares of the fit's cutoff. The best on the fitted
@@ -35,8 +35,6 @@ pub struct Proof {
     pub after: Vec<f64>,
     /// Joints that keep the twin as it was, because their correction predicts no recording that it was not fitted on.
     pub kept: Vec<usize>,
-    /// Effects that the written twin does not have.
-    pub withheld: Vec<Withheld>,
     /// The corrected twin's effort by hold-out recording; NaN in rows that were lost on reading.
     pub predictions: Vec<(String, Vec<f64>)>,
     /// The series of the pictures, held-out recordings first.
@@ -179,12 +177,7 @@ impl Context<'_> {
         let names: Vec<&str> = self.input.model.joint_names().collect();
         let smoothing = self.best_smoothing(problem, found)?;
         let (mut before, mut after) = (Errors::new(n), Errors::new(n));
-        let kept = handed_out::not_carried(problem, scaled, found);
-        let mut held_out = HeldOut {
-            context: self,
-            problem,
-            tracks: Vec::new(),
-        };
+        let kept = not_carried(problem, scaled, found);
         let (mut predictions, mut pictures) = (Vec::new(), Vec::new());
         let held = self.input.holdout.iter().map(|recording| (recording, true));
         let of_fit = self.input.fit.iter().map(|recording| (recording, false));
@@ -215,21 +208,11 @@ impl Context<'_> {
                     &names, recording, is_held, &track, &rigid, &predicted,
                 ));
             }
-            if is_held && !recording.effort.is_empty() {
-                held_out.tracks.push((recording, track));
-            }
         }
-        let before = before.rms();
-        let withheld = if held_out.tracks.is_empty() {
-            Vec::new()
-        } else {
-            held_out.withheld(found, &before)
-        };
         Ok(Proof {
-            before,
+            before: before.rms(),
             after: after.rms(),
             kept,
-            withheld,
             predictions,
             pictures,
         })

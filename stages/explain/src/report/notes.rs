@@ -1,9 +1,6 @@
 //! Notes of the report beside the findings.
 
-use std::collections::BTreeSet;
-
 use crate::data::problem::Problem;
-use crate::data::work::Untried;
 use crate::fit::fitted::Fit;
 use crate::read::audit::losses;
 use crate::read::excerpt::Excerpts;
@@ -33,22 +30,6 @@ pub fn late_twin(late_s: f64) -> Option<String> {
     })
 }
 
-/// That the search ended at its bound, and what it left out.
-pub fn untried(untried: &BTreeSet<Untried>) -> Option<String> {
-    let each = untried.iter().map(|one| match one {
-        Untried::FurtherEffects => "effects beside those that were found",
-        Untried::OtherNames => "other names in the place of some that were found",
-    });
-    let each: Vec<&str> = each.collect();
-    (!each.is_empty()).then(|| {
-        format!(
-            "The search ended at its bound of computing. It did not try {}. To go on from here, explain the same recordings \
-             beside the twin.yaml of this report, as `twin: {{model: twin.yaml}}` of the case.",
-            each.join(" and ")
-        )
-    })
-}
-
 /// Notes on the joints whose correction is not handed out, or makes the error on the held-out recordings larger.
 pub fn not_handed_out(proof: &Proof, found: &Fit, model: &Model, unit: &str) -> Vec<String> {
     let mut notes = Vec::new();
@@ -56,17 +37,8 @@ pub fn not_handed_out(proof: &Proof, found: &Fit, model: &Model, unit: &str) -> 
         let (name, unit) = (&of_joint.name, unit_at(unit, of_joint));
         if proof.kept.contains(&joint) {
             notes.push(format!(
-                "The correction of joint {name} does not predict fitted recordings that were left out. So the predictions of the \
-                 held-out recordings keep the twin as it was at this joint."
-            ));
-        }
-        let own = proof.withheld.iter().filter(|w| w.joint == joint);
-        let effects = own.map(|w| found.actives[w.effect].hypothesis.effect.name);
-        let effects: Vec<&str> = effects.collect();
-        if !effects.is_empty() {
-            notes.push(format!(
-                "The error of joint {name} on the held-out recordings is smaller without {}. So twin.yaml leaves it out.",
-                effects.join(", ")
+                "The correction of joint {name} does not predict fitted recordings that were left out. So twin.yaml and the \
+                 predictions keep the twin as it was at this joint."
             ));
         }
         let (before, after) = (proof.before[joint], proof.after[joint]);
@@ -107,7 +79,7 @@ pub fn notes(
     input: &Input,
     problem: &Problem,
     found: &Fit,
-    rests_count: &[bool],
+    at_rest: bool,
     remaining: &[Remaining],
 ) -> Vec<String> {
     let mut notes = losses(input);
@@ -123,22 +95,12 @@ pub fn notes(
             ));
         }
     }
-    let stuck: Vec<&str> = names
-        .iter()
-        .zip(rests_count)
-        .filter(|(_, counts)| !**counts)
-        .map(|(name, _)| *name)
-        .collect();
-    if !stuck.is_empty() {
-        notes.push(format!(
-            "While {} stands still, its friction can have any value up to the breakaway torque. Such rows were not used for the \
-             fit; they do count in the error on the held-out recordings.",
-            match &stuck[..] {
-                [one] => format!("joint {one}"),
-                all if all.len() == names.len() => "a joint".to_owned(),
-                all => format!("one of the joints {}", all.join(", ")),
-            }
-        ));
+    if !at_rest {
+        notes.push(
+            "While a joint stands still, its friction can have any value up to the breakaway torque. Such rows were not used for \
+             the fit; they do count in the error on the held-out recordings."
+                .to_owned(),
+        );
     }
     notes
 }

@@ -2,25 +2,22 @@
 
 use tauscope_dynamics::terms::UNKNOWN;
 
-use crate::report::remainder::Remainders;
-use crate::report::schema::{Finding, Verdict};
+use crate::report::schema::{Finding, Remaining, Verdict};
 
 /// A finding with less confidence names nothing.
 /// Statistical: it is more likely wrong than right.
 const NAMES: f64 = 0.5;
 
 /// The verdict, given what remains beyond the noise. Where the `twin_is_topic`, a remainder beside findings decides
-/// nothing: another simulation has its own delays and friction, and they are no physics of the arm. Unless `is_worsened`:
-/// a correction that makes a joint worse where it was not fitted explains nothing. Where no finding is more likely right
-/// than wrong, an unknown remains. A fault of the recorded velocity does not decide, because velocities are computed from the
-/// positions.
-pub fn verdict(findings: &[Finding], remainders: &Remainders, twin_is_topic: bool) -> Verdict {
+/// nothing: another simulation has its own delays and friction, and they are no physics of the arm. Where no finding is more
+/// likely right than wrong, an unknown remains. A fault of the recorded velocity does not decide, because velocities are
+/// computed from the positions.
+pub fn verdict(findings: &[Finding], remaining: &[Remaining], twin_is_topic: bool) -> Verdict {
     let findings: Vec<&Finding> = findings.iter().filter(|f| !f.is_of_velocity()).collect();
-    let (remaining, is_worsened) = (&remainders.all, remainders.is_worsened);
     let is_described = |f: &&Finding| f.effect == UNKNOWN.name && !f.is_body_off();
     let described = findings.iter().any(is_described);
     let named = twin_is_topic || findings.iter().any(|f| f.confidence >= NAMES);
-    let decides = !twin_is_topic || findings.is_empty() || is_worsened;
+    let decides = !twin_is_topic || findings.is_empty();
     let of_the_arm = !remaining.is_empty() && decides;
     if described || of_the_arm {
         Verdict::UnknownRemains
@@ -37,7 +34,7 @@ pub fn verdict(findings: &[Finding], remainders: &Remainders, twin_is_topic: boo
 mod tests {
     use super::*;
     use crate::fixture::finding;
-    use crate::report::schema::{Remaining, SHARE_OF_CARRIED};
+    use crate::report::schema::SHARE_OF_CARRIED;
     use serde_json::Value;
 
     #[test]
@@ -46,32 +43,24 @@ mod tests {
             let mut lighter = finding(UNKNOWN.name);
             let share = (SHARE_OF_CARRIED.to_owned(), Value::from(share));
             lighter.parameters.extend([share]);
-            let found = verdict(&[lighter], &Remainders::default(), false);
+            let found = verdict(&[lighter], &[], false);
             assert_eq!(found, said);
         }
     }
 
     #[test]
-    fn beside_another_simulation_only_a_joint_that_got_worse_decides() {
+    fn beside_another_simulation_a_remainder_beside_findings_does_not_decide() {
         let findings = [finding("coulomb_friction")];
-        let remaining = Remaining {
+        let remaining = [Remaining {
             joint: "elbow".to_owned(),
             rms: 2.0,
             holdout_rms: Some(3.0),
             noise: 0.1,
             sentence: String::new(),
-        };
-        for (is_worsened, twin_is_topic, said) in [
-            (false, true, Verdict::Explained),
-            (true, true, Verdict::UnknownRemains),
-            (false, false, Verdict::UnknownRemains),
-        ] {
-            let remainders = Remainders {
-                all: vec![remaining.clone()],
-                is_worsened,
-                ..Remainders::default()
-            };
-            assert_eq!(verdict(&findings, &remainders, twin_is_topic), said);
+        }];
+        for (twin_is_topic, said) in [(true, Verdict::Explained), (false, Verdict::UnknownRemains)]
+        {
+            assert_eq!(verdict(&findings, &remaining, twin_is_topic), said);
         }
     }
 }

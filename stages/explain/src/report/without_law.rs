@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 use tauscope_dynamics::terms::UNKNOWN;
 
-use crate::report::remainder::Remainders;
 use crate::report::schema::{Finding, Remaining, WITHOUT_LAW};
 
 /// A joint is told if it leaves at least this share of what the joint leaves that leaves most, each in units of its noise: what
@@ -24,19 +23,15 @@ const CONFIDENCE_AMONG: f64 = 0.6;
 /// Statistical: as `verdict::NAMES`.
 const TELLS: f64 = 0.5;
 
-/// Findings for the joints that leave most, and several times what the others leave, where no `unknown` among the findings `said` tells of the joint. `in_amperes`:
-/// the efforts of the recordings are currents.
+/// Findings for the joints that leave most, where no `unknown` among the findings `said` tells of the joint. `in_amperes`: the
+/// efforts of the recordings are currents.
 pub fn findings(
-    remainders: &Remainders,
+    remaining: &[Remaining],
     said: &[Finding],
     sliding: &[String],
     in_amperes: bool,
 ) -> Vec<Finding> {
-    let alone = || {
-        let is_alone = |one: &&Remaining| remainders.alone.contains(&one.joint);
-        remainders.all.iter().filter(is_alone)
-    };
-    let loudest = alone().map(Remaining::over_noise);
+    let loudest = remaining.iter().map(Remaining::over_noise);
     let least = LEAST_SHARE * loudest.fold(0.0, f64::max);
     let is_told = |remaining: &Remaining| {
         let here = |f: &&Finding| f.joint.as_ref() == Some(&remaining.joint);
@@ -44,7 +39,7 @@ pub fn findings(
         here.any(|f| f.effect == UNKNOWN.name && f.confidence >= TELLS)
     };
     let loud = |remaining: &&Remaining| remaining.over_noise() >= least;
-    let all: Vec<&Remaining> = alone().filter(loud).collect();
+    let all: Vec<&Remaining> = remaining.iter().filter(loud).collect();
     let confidence = if all.len() == 1 {
         CONFIDENCE_ALONE
     } else {
@@ -107,17 +102,10 @@ mod tests {
     }
 
     fn told(all: &[(&str, f64)], said: &[Finding]) -> Vec<(String, f64)> {
-        let remainders = Remainders {
-            alone: (all.iter().map(|(joint, _)| (*joint).to_owned()))
-                .filter(|joint| joint != "turn")
-                .collect(),
-            all: all
-                .iter()
-                .map(|(joint, rms)| remaining(joint, *rms))
-                .collect(),
-            ..Remainders::default()
-        };
-        let findings = findings(&remainders, said, &[], false);
+        let remaining: Vec<Remaining> = (all.iter())
+            .map(|(joint, rms)| remaining(joint, *rms))
+            .collect();
+        let findings = findings(&remaining, said, &[], false);
         findings
             .into_iter()
             .map(|f| (f.joint.unwrap_or_default(), f.confidence))
@@ -130,8 +118,6 @@ mod tests {
         assert_eq!(told(&[], &[]), []);
         let one = [("elbow".to_owned(), CONFIDENCE_ALONE)];
         assert_eq!(told(&[("lift", 1.0), ("elbow", 4.0)], &[]), one);
-        // Where all joints leave as much, nothing says which it is.
-        assert_eq!(told(&[("turn", 9.0), ("elbow", 4.0)], &[]), one);
         let both = ["lift", "elbow"].map(|joint| (joint.to_owned(), CONFIDENCE_AMONG));
         assert_eq!(told(&[("lift", 3.0), ("elbow", 4.0)], &[]), both);
     }

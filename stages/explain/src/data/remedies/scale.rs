@@ -90,7 +90,6 @@ mod tests {
             holdout: Vec::new(),
             start: None,
             without: std::collections::BTreeSet::new(),
-            method: crate::read::input::Method::default(),
         };
         let slopes: Vec<(usize, f64)> = slopes.iter().copied().enumerate().collect();
         of_scale(&input, &slopes).map(|slip| slip.remedy)

@@ -1,37 +1,45 @@
 //! What is kept of a finding's rivals: why they were rejected, and the motion that would separate those that tie.
 
-use super::contest::Contest;
 use super::{Named, place_of, rival};
-use crate::physics::active::Active;
+use crate::inference::{AS_LIKELY, Alternative};
+use crate::physics::active::{Active, Hypothesis};
 use crate::read::input::Input;
-use crate::report::next_motion;
 use crate::report::schema::{NextMotion, Rejected, Rival};
+use crate::report::{next_motion, sentences};
 
 impl Named {
-    /// Keeps the rejected rivals of a finding, and the motion that would separate those that tie with it. Returns those
-    /// that tie.
+    /// Keeps the rivals of a finding that are less likely, and the motion that would separate those that are as likely. Returns
+    /// the latter. `margin` is what the explanation loses without the finding \[nats\].
     pub(super) fn keep_rivals(
         &mut self,
         active: &Active,
-        contest: Contest,
+        margin: f64,
+        others: &[Alternative],
         input: &Input,
         joints: &[String],
     ) -> Vec<Rival> {
-        for (hypothesis, reason) in contest.rejected {
-            let (joint, link) = place_of(input, joints, &hypothesis);
+        let (ties, less_likely): (Vec<Alternative>, Vec<Alternative>) =
+            others.iter().partition(|other| other.behind < AS_LIKELY);
+        // A rival that explains nothing is none.
+        for other in less_likely.iter().filter(|other| other.behind <= margin) {
+            let (joint, link) = place_of(input, joints, &other.hypothesis);
             self.rejected.push(Rejected {
-                effect: hypothesis.effect.name.to_owned(),
+                effect: other.hypothesis.effect.name.to_owned(),
                 joint,
                 link,
-                reason,
+                reason: format!(
+                    "in place of {} it makes the recordings {} times less likely",
+                    active.hypothesis.effect.words.noun,
+                    sentences::odds(other.behind)
+                ),
             });
         }
-        let next = next_motion::of(&active.hypothesis, &contest.ties, input, joints);
+        let ties: Vec<Hypothesis> = ties.iter().map(|other| other.hypothesis).collect();
+        let next = next_motion::of(&active.hypothesis, &ties, input, joints);
         if let Some((next, trajectory)) = next {
             self.keep_motion(next, trajectory);
         }
-        let ties = contest.ties.iter();
-        ties.map(|tie| rival(input, joints, tie)).collect()
+        ties.iter().map(|tie| rival(input, joints, tie)).collect()
     }
 
     /// Keeps a motion to record next, unless the same motion separates the rivals of another finding already.

@@ -12,8 +12,8 @@ use crate::fit::fitted::{Fit, likelihood, variances};
 use crate::fit::least_squares::Products;
 use crate::physics::active::{Active, Hypothesis};
 use crate::physics::friction::least;
-use crate::select::grid::{best_of, shape_index, shapes};
-use crate::select::trial::{Factored, Trial};
+use crate::propose::grid::{best_of, shape_index, shapes};
+use crate::propose::trial::{Factored, Trial};
 
 /// How often the grid step is halved around its best value.
 /// Resolution: a further halving costs at most two first-order scores; the fit refines the shape afterwards.
@@ -52,8 +52,6 @@ pub struct Proposal {
     pub gain: f64,
     /// Penalty for its free parameters and for the size of the library \[nats\].
     pub penalty: f64,
-    /// Variance that it explains at a joint over the variance then left there; the largest over joints.
-    pub size: f64,
 }
 
 impl Proposal {
@@ -132,11 +130,6 @@ impl<'a> Base<'a> {
         Trial::new(self.problem, self.fit, own, alone, columns)
     }
 
-    /// The square of a column at each joint, after the fit's own columns have taken what they can of it.
-    pub fn squares_beside(&self, column: &Column) -> Option<Vec<f64>> {
-        self.trial(None, &[column]).squares_beside(&self.factored)
-    }
-
     /// First-order score of a hypothesis with these columns, at the fit's variances: it ranks many candidates quickly.
     pub fn first_order_score<C: Borrow<Column>>(
         &self,
@@ -173,13 +166,13 @@ impl<'a> Base<'a> {
     }
 
     /// Solves for the factors of additional `columns`, after `alone` is subtracted from the residual. Returns the
-    /// factors, the gain of log-likelihood and the size as in [`Proposal::size`]. No factor is below its `minimum`.
+    /// factors and the gain of log-likelihood. No factor is below its `minimum`.
     pub fn try_columns<C: Borrow<Column>>(
         &self,
         alone: Option<&Column>,
         columns: &[C],
         minimum: &[f64],
-    ) -> Option<(Vec<f64>, f64, f64)> {
+    ) -> Option<(Vec<f64>, f64)> {
         let products = self.trial(alone, columns).products();
         let p = self.jacobian.len();
         let q = columns.len();
@@ -212,12 +205,7 @@ impl<'a> Base<'a> {
         let squares = products.all_left(&solution);
         let variance = variances(self.problem, &squares, &products.count);
         let gain = likelihood(&variance, &products.count) - self.fit.likelihood();
-        let size = (0..squares.len())
-            .map(|j| {
-                (self.fit.squares[j] - squares[j]) / (products.count[j].max(1.0) * variance[j])
-            })
-            .fold(0.0, f64::max);
-        Some((solution.rows(p, q).iter().copied().collect(), gain, size))
+        Some((solution.rows(p, q).iter().copied().collect(), gain))
     }
 
     /// The best proposal of a hypothesis over the grid of its shapes. Effects in time are searched in `windows`.
@@ -282,7 +270,7 @@ impl<'a> Base<'a> {
     ) -> Option<Proposal> {
         let factors = hypothesis.factors();
         let minimum = minimum(self.problem, hypothesis);
-        let (values, gain, size) = self.try_columns(alone, columns, &minimum)?;
+        let (values, gain) = self.try_columns(alone, columns, &minimum)?;
         let mut coordinates = shape.to_vec();
         for (&i, value) in factors.iter().zip(values) {
             coordinates[i] = value;
@@ -294,7 +282,6 @@ impl<'a> Base<'a> {
             active: hypothesis.with(coordinates),
             gain,
             penalty: self.penalty(free, hypothesis.only_joint()) + prior,
-            size,
         })
     }
 }
@@ -333,7 +320,7 @@ mod tests {
         let base = Base::new(&problem, &nothing, 40);
         let found = base.propose(at_joint("viscous_friction", 0)).unwrap();
         assert!((found.active.coordinates[0] - 0.8).abs() < 0.02);
-        assert!(found.evidence() > 100.0 && found.size > 1.0);
+        assert!(found.evidence() > 100.0);
         let other = base.propose(at_joint("viscous_friction", 1));
         assert!(other.is_none_or(|other| other.evidence() < 0.0));
     }

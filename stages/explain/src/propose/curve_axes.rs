@@ -3,7 +3,10 @@
 use tauscope_dynamics::JointKind;
 use tauscope_dynamics::terms::{Against, Gauge, MotionSample, Table};
 
+use crate::data::column::Column;
 use crate::data::problem::Problem;
+use crate::fit::fitted::Fit;
+use crate::physics::active::Active;
 
 /// Knots of a curve.
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -217,12 +220,22 @@ fn deviation(values: &[f64]) -> f64 {
     (squares / count).sqrt()
 }
 
+/// The effort of a unit at each free knot of a curve, in addition to the effects of `fit`.
+pub(crate) fn knot_columns(problem: &Problem, fit: &Fit, curve: &Active) -> Vec<Column> {
+    let free = curve.coordinates.len();
+    let unit = |k: usize| {
+        let mut unit = curve.clone();
+        unit.coordinates = (0..free)
+            .map(|other| f64::from(u8::from(other == k)))
+            .collect();
+        fit.added(problem, &unit)
+    };
+    (0..free).map(unit).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::fitted::Fit;
-    use crate::fixture::problem_with;
-    use crate::select::propose::Base;
 
     #[test]
     fn a_curve_may_jump_at_zero_and_only_there() {
@@ -231,46 +244,5 @@ mod tests {
             [-2.0, -0.5, -0.04, 0.04, 0.7, 1.0]
         );
         assert_eq!(with_jump(vec![0.1, 0.5, 1.0]), [0.1, 0.5, 1.0]);
-    }
-
-    #[test]
-    fn joints_that_rub_on_each_other_are_drawn_over_how_fast_they_move_against_each_other() {
-        let problem = problem_with(4, |_, qd, effort| {
-            let rubs = 1.5 * (qd[0] - qd[1]).signum();
-            effort[0] += rubs;
-            effort[1] -= rubs;
-        });
-        let nothing = Fit::new(&problem, Vec::new());
-        for joint in [0, 1] {
-            let curve = Base::new(&problem, &nothing, 40)
-                .propose_curve(joint)
-                .unwrap();
-            let drawn = curve.active.curve.as_ref().unwrap();
-            assert_eq!(
-                (drawn.against, drawn.of_joint),
-                (Against::VelocityDifference, 0)
-            );
-            assert!(
-                curve.repeats && curve.carried.unwrap() > 0.8,
-                "{:?}",
-                curve.carried
-            );
-        }
-    }
-
-    #[test]
-    fn what_winds_up_at_each_turn_is_drawn_over_the_way_since_then() {
-        let (mut turned_rad, mut before) = (0.0_f64, None);
-        let problem = problem_with(4, |q, qd, effort| {
-            // The spring of a drive whose friction lies behind it.
-            let by = q[1] - before.replace(q[1]).unwrap_or(q[1]);
-            turned_rad = (turned_rad + by).clamp(-0.1, 0.1);
-            effort[1] += 2.0 * (turned_rad / 0.1 - qd[1].signum());
-        });
-        let nothing = Fit::new(&problem, Vec::new());
-        let base = Base::new(&problem, &nothing, 40);
-        let curve = base.propose_curve(1).unwrap();
-        let drawn = curve.active.curve.as_ref().unwrap();
-        assert_eq!((drawn.against, drawn.of_joint), (Against::SinceTurn, 1));
     }
 }

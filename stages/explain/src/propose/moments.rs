@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use crate::data::column::Column;
 use crate::physics::active::Hypothesis;
-use crate::select::grid::best_of;
-use crate::select::intervals::STEPS;
-use crate::select::propose::{Base, Proposal};
-use crate::select::windows::{BESIDE_S, SCANNED_FACTORS, gain, time_indices};
+use crate::propose::base::{Base, Proposal};
+use crate::propose::grid::best_of;
+use crate::propose::intervals::STEPS;
+use crate::propose::windows::{BESIDE_S, SCANNED_FACTORS, gain, time_indices};
 
 /// So long before the session and after it nothing changes \[s\].
 /// Resolution: longer than any session, so that a recording that is held out lies within.

@@ -9,9 +9,9 @@ use tauscope_dynamics::terms::CoordinateKind;
 use crate::data::column::Column;
 use crate::physics::active::Hypothesis;
 use crate::physics::active::TimeKind;
-use crate::select::grid::best_of;
-use crate::select::intervals::{STEPS, Steps, intervals};
-use crate::select::propose::{Base, Proposal};
+use crate::propose::base::{Base, Proposal};
+use crate::propose::grid::best_of;
+use crate::propose::intervals::{STEPS, Steps, intervals};
 
 /// Shortest interval that is searched \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.

@@ -85,9 +85,6 @@ impl<'a> Trial<'a> {
         columns: &[C],
     ) -> Self {
         let (p, q) = (jacobian.len(), columns.len());
-        problem
-            .work
-            .add_products((p + q) * q * problem.rows * problem.joints);
         let mut trial = Self {
             fit,
             own,
@@ -148,7 +145,6 @@ impl<'a> Trial<'a> {
         firsts: &[usize],
     ) -> Vec<Self> {
         let (p, joints) = (jacobian.len(), problem.joints);
-        problem.work.add_products((p + 2) * problem.rows * joints);
         let blank = Self {
             fit,
             own,
@@ -215,22 +211,6 @@ impl<'a> Trial<'a> {
         self.own_right[joint]
             .as_ref()
             .unwrap_or(&self.own.right[joint])
-    }
-
-    /// The square of the first new column at each joint, after the fit's own columns have taken what they can of it.
-    pub fn squares_beside(&self, own: &Factored) -> Option<Vec<f64>> {
-        let mut cross = DVector::zeros(own.right.len());
-        for (j, variance) in self.fit.variance.iter().enumerate() {
-            cross += self.cross[j].column(0) / *variance;
-        }
-        let taken = own.solve(DMatrix::from_column_slice(cross.len(), 1, cross.as_slice()))?;
-        let taken = taken.column(0);
-        let of_joint = |j: usize| {
-            let of_own = (&self.own.gram[j] * taken).dot(&taken);
-            self.gram[j][(0, 0)] - 2.0 * self.cross[j].column(0).dot(&taken) + of_own
-        };
-        let all = (0..self.square.len()).map(of_joint);
-        Some(all.map(|square| square.max(0.0)).collect())
     }
 
     /// Gain of log-likelihood by the new columns, with factors not below `minimum`. The factors are solved for at the

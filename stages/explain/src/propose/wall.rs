@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 use tauscope_dynamics::{Data, forward_kinematics, link_jacobian, link_pose};
 
+use crate::fit::fitted::LEAST_VARIANCE;
 use crate::physics::active::Hypothesis;
-use crate::select::evidence::LEAST_VARIANCE;
-use crate::select::propose::{Base, Proposal};
+use crate::propose::base::{Base, Proposal};
 use tauscope_dynamics::kinematic_tree::moving_link;
 
 /// A sample belongs to a contact if the best force there reduces the sum of squares over the variance by this much.
@@ -137,8 +137,8 @@ mod tests {
     use crate::fit::fitted::Fit;
     use crate::fixture::{URDF, problem, recording};
     use crate::physics::active::{Hypothesis, Whereabouts};
-    use crate::select::plausible::plausible;
-    use crate::select::propose::Base;
+    use crate::physics::plausible::plausible;
+    use crate::propose::base::Base;
     use tauscope_dynamics::kinematic_tree::{bearing, moving_link, reach_m};
 
     /// Stiffness \[N/m\] and offset \[m\] of the wall that is found where the arm presses on a floor of 800 N/m at
