@@ -184,7 +184,7 @@ fn searched<'s>(
         objective: &objective,
         here,
     };
-    let taken = step.taken(&own, found);
+    let taken = step.taken(&own, &found);
     (objective, taken, is_partial)
 }
 

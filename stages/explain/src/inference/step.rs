@@ -46,10 +46,10 @@ pub struct Taken {
 
 impl Step<'_> {
     /// What is reached on the way from a set to the set that was found.
-    pub fn taken(&self, own: &Set, found: Set) -> Taken {
+    pub fn taken(&self, own: &Set, found: &Set) -> Taken {
         let score = |set: &Set| self.objective.score(set);
         let mut added: Vec<(f64, usize)> = (found.iter().filter(|v| !own.contains(v)))
-            .map(|&v| (score(&search::without(&found, v)), v))
+            .map(|&v| (score(&search::without(found, v)), v))
             .collect();
         added.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (mut set, mut first, mut count) = (found.clone(), 0, added.len());
@@ -75,7 +75,7 @@ impl Step<'_> {
             let newcomers: Set = (added[first..].iter().take(count))
                 .map(|(_, v)| *v)
                 .collect();
-            set = self.joined(own, &found, newcomers);
+            set = self.joined(own, found, newcomers);
         }
     }
 

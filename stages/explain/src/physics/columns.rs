@@ -24,7 +24,6 @@ pub fn columns(
     let gains = &parts.gains;
     let body = hypothesis.effect.layer == Layer::Body;
     let plain = parts.is_plain(&hypothesis);
-    if !plain || hypothesis.needs_load() || problem.rows > MOST_ROWS {}
     if hypothesis.needs_load() && plain {
         let efforts = Efforts::of_bodies(parts.load(problem, actives));
         return Arc::new(computed(problem, &[], &efforts, hypothesis, shape, gains));
