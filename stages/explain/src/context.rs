@@ -99,6 +99,7 @@ impl Context<'_> {
             self.unit_nm,
             rests_count,
         );
+        problem.first_gains = self.first_gains();
         if !self.input.bodies && !self.at_rest {
             problem.is_foreign = true;
             leave_out_other_states(&mut problem);

@@ -14,6 +14,7 @@ mod left_out;
 mod margins;
 mod nested;
 mod noise;
+mod normal;
 mod nuisance;
 mod objective;
 mod prior;
@@ -35,11 +36,10 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
 
-use around::Around;
 use left_out::LeftOut;
 use margins::margins;
 pub use margins::{AS_LIKELY, Alternative};
-use nuisance::{Nuisance, Size, Source};
+use nuisance::{Nuisance, Size};
 use objective::{Objective, Set};
 use prior::Magnitude;
 use space::Space;
@@ -110,8 +110,8 @@ pub fn infer(
                 covariance: solution.covariance,
                 margins,
                 alternatives,
-                smallest: smallest(&objective, &taken.set),
-                bodies: mean_bodies(&nuisances, solution.nuisances.as_slice()),
+                smallest: around::smallest(&objective, &taken.set),
+                bodies: nuisance::mean_bodies(&nuisances, solution.nuisances.as_slice()),
                 remaining: remaining(problem, &space, &solution.fit, &state.efforts),
                 fit: solution.fit,
             };
@@ -223,31 +223,11 @@ pub fn around(problem: &Problem, hypotheses: &[Hypothesis], fit: Fit, bodies: bo
         covariance: refine::covariance(problem, &space, &fit, &deviations),
         margins,
         alternatives,
-        smallest: smallest(&objective, &own),
+        smallest: around::smallest(&objective, &own),
         bodies: Vec::new(),
         remaining: Vec::new(),
         fit,
     }
-}
-
-/// The smallest factor with which each effect that a set lacks would join it, of those that have one factor and are told.
-fn smallest(objective: &Objective<'_>, set: &Set) -> Vec<(Hypothesis, f64)> {
-    let Some(around) = Around::new(objective, set) else {
-        return Vec::new();
-    };
-    let is_told = |v: &usize| {
-        let hypothesis = objective.variants[*v].hypothesis;
-        hypothesis.effect.traits.smallest_told_as.is_some() && objective.fits(set, *v)
-    };
-    let told = (0..objective.variants.len()).filter(is_told);
-    let mut all: Vec<(Hypothesis, f64)> = Vec::new();
-    for v in told {
-        let hypothesis = objective.variants[v].hypothesis;
-        if all.iter().all(|(other, _)| *other != hypothesis) {
-            all.extend(around.smallest(v).map(|factor| (hypothesis, factor)));
-        }
-    }
-    all
 }
 
 /// The set with only one new effect whose effort is not linear in its numbers and that several joints feel, and whether any
@@ -337,30 +317,6 @@ fn remaining(
         })
         .collect();
     remainder::predicted(space, &residuals, &remainder::features(problem, fit))
-}
-
-/// The mean changes of the links' inertial parameters.
-fn mean_bodies(nuisances: &[Nuisance], means: &[f64]) -> Vec<Active> {
-    let mut all: Vec<Active> = Vec::new();
-    for (nuisance, mean) in nuisances.iter().zip(means) {
-        let Source::Body { link, parameters } = nuisance.source else {
-            continue;
-        };
-        let Some(hypothesis) = nuisance::body_hypothesis(link) else {
-            continue;
-        };
-        let at = all
-            .iter()
-            .position(|active| active.hypothesis == hypothesis);
-        let at = at.unwrap_or_else(|| {
-            all.push(hypothesis.with(vec![0.0; parameters.len()]));
-            all.len() - 1
-        });
-        for (x, parameter) in all[at].coordinates.iter_mut().zip(&parameters) {
-            *x += mean * parameter;
-        }
-    }
-    all
 }
 
 #[cfg(test)]

@@ -158,6 +158,7 @@ impl Problem {
             effective_samples: Vec::new(),
             known_friction: vec![BTreeMap::new(); n],
             is_foreign: false,
+            first_gains: vec![1.0; model.dof()],
             cache: Arc::default(),
             units: Arc::default(),
             bare: OnceLock::new(),

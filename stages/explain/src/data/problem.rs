@@ -48,6 +48,8 @@ pub struct Problem {
     pub known_friction: Vec<BTreeMap<&'static str, f64>>,
     /// Whether the twin's effort is another simulation's, which follows the command and not the motion.
     pub is_foreign: bool,
+    /// By joint, the gain that the fit of an unknown torque scale starts from \[effort unit per model unit\].
+    pub first_gains: Vec<f64>,
     /// Columns that were computed before.
     pub cache: Arc<ColumnCache>,
     /// What unit bodies cost.

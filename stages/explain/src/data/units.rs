@@ -76,13 +76,11 @@ pub fn scales(input: &Input, constants: &[f64], at_rest: bool) -> (Vec<f64>, Vec
     }
     let joints = 0..constants.len();
     let Some(start) = &input.start else {
+        let likely = units_under_gravity(input);
+        let gains = likely.iter().map(|unit| 1.0 / unit).enumerate().collect();
         // At rest nothing else would tell them.
-        let units_nm = if at_rest {
-            units_under_gravity(input)
-        } else {
-            constants.to_vec()
-        };
-        return (units_nm, joints.map(|j| (j, 1.0)).collect());
+        let units_nm = if at_rest { likely } else { constants.to_vec() };
+        return (units_nm, gains);
     };
     let unknown = joints.filter(|&j| !start.is_scale_known(j));
     let unknown = unknown.map(|j| (j, start.gain[j])).collect();

@@ -1,4 +1,4 @@
-//! What a fit leaves of recordings that are left out of it.
+//! Residual of a fit in recordings that are left out of it.
 
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;

@@ -8,10 +8,12 @@ use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::physics::active::Hypothesis;
+
 use super::objective::{Base, Objective, Set, mean_and_inverse};
 use super::space::Whitened;
 
-/// Largest factor that is looked for, in prior standard deviations. Resolution: larger ones cannot be missed.
+/// Largest factor of a bisection, in prior standard deviations. Resolution: larger ones cannot be missed.
 const LARGEST: f64 = 10.0;
 /// Halvings of a bisection. Resolution: to a millionth of the largest.
 const HALVINGS: usize = 24;
@@ -186,6 +188,26 @@ impl<'a> Around<'a> {
         };
         variants.iter().map(one).collect()
     }
+}
+
+/// Smallest factor of each effect that a set lacks, beyond which it would join the set: of the effects that reports list.
+pub fn smallest(objective: &Objective<'_>, set: &Set) -> Vec<(Hypothesis, f64)> {
+    let Some(around) = Around::new(objective, set) else {
+        return Vec::new();
+    };
+    let is_told = |v: &usize| {
+        let hypothesis = objective.variants[*v].hypothesis;
+        hypothesis.effect.traits.smallest_told_as.is_some() && objective.fits(set, *v)
+    };
+    let told = (0..objective.variants.len()).filter(is_told);
+    let mut all: Vec<(Hypothesis, f64)> = Vec::new();
+    for v in told {
+        let hypothesis = objective.variants[v].hypothesis;
+        if all.iter().all(|(other, _)| *other != hypothesis) {
+            all.extend(around.smallest(v).map(|factor| (hypothesis, factor)));
+        }
+    }
+    all
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use tauscope_dynamics::terms::{EFFECTS, PlaceKind};
 use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
-use crate::physics::active::{BODY, Hypothesis, Whereabouts};
+use crate::physics::active::{Active, BODY, Hypothesis, Whereabouts};
 
 use super::laws::{column_of, curves};
 
@@ -21,7 +21,7 @@ const INERTIA_SHARE: f64 = 0.1;
 const LAW_SHARE: f64 = 0.02;
 /// Usual error of a law of friction, as a share of the joint's friction. Chosen: as the other laws.
 const FRICTION_SHARE: f64 = 0.05;
-/// The same of another simulation's friction. Chosen: it is another's estimate of the same arm.
+/// Usual error of another simulation's law of friction, as a share. Chosen: two estimates of one arm differ by a fifth.
 const OTHER_FRICTION_SHARE: f64 = 0.2;
 /// Usual difference between the stamps of effort and position of one joint, apart from that of all \[s\], at least half a
 /// sample. Chosen: of the order of a controller's cycle.
@@ -298,4 +298,28 @@ fn of_stamps(problem: &Problem, fit: &Fit, joint: usize) -> Nuisance {
         column: late(problem, fit, joint).times(stamp_s(sample_s(problem))),
         source: Source::Stamp,
     }
+}
+
+/// The mean changes of the links' inertial parameters.
+pub fn mean_bodies(nuisances: &[Nuisance], means: &[f64]) -> Vec<Active> {
+    let mut all: Vec<Active> = Vec::new();
+    for (nuisance, mean) in nuisances.iter().zip(means) {
+        let Source::Body { link, parameters } = nuisance.source else {
+            continue;
+        };
+        let Some(hypothesis) = body_hypothesis(link) else {
+            continue;
+        };
+        let at = all
+            .iter()
+            .position(|active| active.hypothesis == hypothesis);
+        let at = at.unwrap_or_else(|| {
+            all.push(hypothesis.with(vec![0.0; parameters.len()]));
+            all.len() - 1
+        });
+        for (x, parameter) in all[at].coordinates.iter_mut().zip(&parameters) {
+            *x += mean * parameter;
+        }
+    }
+    all
 }

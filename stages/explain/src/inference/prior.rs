@@ -27,8 +27,9 @@ const CENTRE_M: f64 = 0.05;
 const TILT_RAD: f64 = 0.1;
 /// Usual offset of a joint's zero \[rad\]. Chosen: 1 degree.
 const ZERO_RAD: f64 = 0.02;
-/// Torque scale of which nothing is known. Resolution: so wide that it does not matter.
-const UNKNOWN_SCALE: f64 = 10.0;
+/// Usual deviation of an unknown torque scale from what gravity tells of it or of the other joints, as a share. Chosen: drives of
+/// one arm are alike by order of magnitude.
+const SCALE_SHARE: f64 = 1.0;
 /// Usual deviation of a torque constant, as a share. Chosen: by order of magnitude.
 const GAIN_SHARE: f64 = 0.2;
 
@@ -57,7 +58,7 @@ pub fn deviations(
     let factors = factors.filter(|c| matches!(c.kind, CoordinateKind::Factor { .. }));
     let of = |(coordinate, peak): (&Coordinate, &f64)| {
         if hypothesis.is_torque_scale() {
-            return UNKNOWN_SCALE;
+            return SCALE_SHARE * problem.first_gains[hypothesis.place.joint].abs();
         }
         let of_effort = USUAL_SHARE / peak.max(1e-12);
         let usual = match words::unit(coordinate.name).map_or("", |(_, unit)| unit) {
@@ -76,4 +77,13 @@ pub fn deviations(
         usual.min(3.0 * of_effort)
     };
     factors.zip(column_peaks).map(of).collect()
+}
+
+/// Prior mean of the factors of a hypothesis.
+pub fn centre(problem: &Problem, hypothesis: Hypothesis) -> f64 {
+    if hypothesis.is_torque_scale() {
+        problem.first_gains[hypothesis.place.joint] - 1.0
+    } else {
+        0.0
+    }
 }

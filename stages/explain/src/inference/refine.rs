@@ -30,15 +30,23 @@ pub struct Solution {
     pub nuisances: DVector<f64>,
 }
 
-/// Refines all coordinates. `deviations` are the prior standard deviations of all coordinates, infinite for shapes.
-pub fn refine(problem: &Problem, space: &Space, start: Fit, deviations: &[f64]) -> Solution {
+/// Refines all coordinates. `centres` and `deviations` are the prior means and standard deviations of all coordinates; the
+/// latter are infinite for shapes.
+pub fn refine(
+    problem: &Problem,
+    space: &Space,
+    start: Fit,
+    (centres, deviations): (&[f64], &[f64]),
+) -> Solution {
     let mut fit = start;
     let free = fit.parameters();
     let prior = precisions(deviations);
     let numbers = |fit: &Fit| {
         DVector::from_iterator(
             free.len(),
-            free.iter().map(|&(i, c)| fit.actives[i].coordinates[c]),
+            free.iter()
+                .zip(centres)
+                .map(|(&(i, c), centre)| fit.actives[i].coordinates[c] - centre),
         )
     };
     let cost = |fit: &Fit| {

@@ -32,7 +32,7 @@ pub struct Step<'a> {
     pub here: f64,
 }
 
-/// What a step reaches.
+/// Result of a step.
 pub struct Taken {
     /// The set.
     pub set: Set,
@@ -45,7 +45,7 @@ pub struct Taken {
 }
 
 impl Step<'_> {
-    /// What is reached on the way from a set to the set that was found.
+    /// Steps from a set towards the set that was found.
     pub fn taken(&self, own: &Set, found: &Set) -> Taken {
         let score = |set: &Set| self.objective.score(set);
         let mut added: Vec<(f64, usize)> = (found.iter().filter(|v| !own.contains(v)))
@@ -118,6 +118,7 @@ fn refined(problem: &Problem, space: &Space, objective: &Objective<'_>, set: &Se
         .zip(&factors)
         .map(|(variant, factors)| variant.with(factors));
     let fit = Fit::new(problem, actives.collect());
-    let deviations: Vec<f64> = own.flat_map(Variant::all_deviations).collect();
-    refine::refine(problem, space, fit, &deviations)
+    let deviations: Vec<f64> = own.clone().flat_map(Variant::all_deviations).collect();
+    let centres: Vec<f64> = own.flat_map(Variant::all_centres).collect();
+    refine::refine(problem, space, fit, (&centres, &deviations))
 }

@@ -32,6 +32,8 @@ pub struct Variant {
     pub offset: Option<usize>,
     /// Index of the first of its factors' columns.
     pub first: usize,
+    /// Means of the factors.
+    pub centres: Vec<f64>,
     /// Standard deviations of the factors.
     pub deviations: Vec<f64>,
     /// By factor, whether it cannot be negative.
@@ -45,25 +47,40 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// The effect with these factors.
+    /// The effect with factors that differ so much from their means.
     pub fn with(&self, factors: &[f64]) -> Active {
         if let Some(curve) = &self.curve {
             return curve.with(factors);
         }
         let mut coordinates = self.shape.clone();
-        for (&i, value) in self.hypothesis.factors().iter().zip(factors) {
-            coordinates[i] = *value;
+        let factors = factors.iter().zip(&self.centres);
+        for (&i, (value, centre)) in self.hypothesis.factors().iter().zip(factors) {
+            coordinates[i] = value + centre;
         }
         self.hypothesis.with(coordinates)
     }
 
-    /// The factors of an effect of this kind.
+    /// How much the factors of an effect of this kind differ from their means.
     pub fn factors_of(&self, active: &Active) -> Vec<f64> {
         if let Some(curve) = &self.curve {
             return curve.factors(&active.coordinates);
         }
-        let factors = self.hypothesis.factors().into_iter();
-        factors.map(|i| active.coordinates[i]).collect()
+        let factors = self.hypothesis.factors().into_iter().zip(&self.centres);
+        factors
+            .map(|(i, centre)| active.coordinates[i] - centre)
+            .collect()
+    }
+
+    /// Prior means of all coordinates, zero for shapes and times.
+    pub fn all_centres(&self) -> Vec<f64> {
+        if self.curve.is_some() {
+            return self.centres.clone();
+        }
+        let mut all = vec![0.0; self.shape.len()];
+        for (&i, centre) in self.hypothesis.factors().iter().zip(&self.centres) {
+            all[i] = *centre;
+        }
+        all
     }
 
     /// Prior standard deviations of all coordinates, infinite for shapes and times.
@@ -126,6 +143,7 @@ impl Given {
         let free = self.factors.len();
         let usual = prior::USUAL_SHARE * sizes[curve.hypothesis.place.joint].rms;
         self.variant.deviations = vec![usual; free];
+        self.variant.centres = vec![0.0; free];
         self.variant.positive = vec![false; free];
         self.variant.curve = Some(curve);
     }
@@ -192,7 +210,10 @@ pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[Magnitude]) -> Vec<Given> {
         let own = free.iter().zip(&jacobian);
         let own = own.filter(|((of, c), _)| *of == i && fit.is_factor(i, *c));
         let factors: Vec<(f64, Arc<Column>)> = own
-            .map(|((_, c), column)| (active.coordinates[*c], Arc::clone(column)))
+            .map(|((_, c), column)| {
+                let centre = prior::centre(problem, active.hypothesis);
+                (active.coordinates[*c] - centre, Arc::clone(column))
+            })
             .collect();
         // The intercept of the tangent: the effect's effort less that of its factors.
         let joint = active.hypothesis.only_joint();
@@ -335,6 +356,7 @@ fn given(
             shape,
             offset: None,
             first: 0,
+            centres: vec![prior::centre(problem, hypothesis); shares.len()],
             deviations: prior::deviations(
                 problem,
                 hypothesis,

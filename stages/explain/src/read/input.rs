@@ -30,7 +30,7 @@ pub struct Input {
     pub without: BTreeSet<String>,
 }
 
-/// One of so many recordings is held out, or of fewer. Chosen: most of the data is fitted.
+/// Recordings for each one that is held out. Chosen: most of the data is fitted.
 const FOR_ONE_HELD_OUT: usize = 4;
 
 impl Input {

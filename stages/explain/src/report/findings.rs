@@ -37,7 +37,7 @@ use waves::merge_waves;
 /// Tuned: by hand, on no recorded seeds; not swept.
 const VAGUE_S: f64 = 5.0;
 
-/// How the log-odds of a finding grow with the logarithm of one plus its margin: they are even without a margin. Chosen: with
+/// Slope of a finding's log-odds over the logarithm of one plus its margin; without a margin the odds are even. Chosen: with
 /// arms of another hand in view; a calibration on seeds of its own is to replace it.
 const LOG_ODDS: f64 = 0.6;
 
@@ -163,7 +163,7 @@ pub fn of(
         finding.sentence += far_out::far_out(finding, &problem.model).unwrap_or_default();
     }
     merge_waves(&mut named.findings);
-    // What the bodies' errors would look like is no more certain than they are.
+    // The errors of such bodies look like these effects.
     if fit.actives.iter().any(|a| imitates(a.hypothesis.effect)) {
         named.notes.extend(oddities(&input.model));
     }
