@@ -226,8 +226,9 @@ fn a_gripper_of_the_urdf_that_is_not_mounted_is_told_with_its_mass() {
     );
     assert_eq!(found["parameters"]["kind"], "absent_tool");
     let [low, high] = [0, 1].map(|end| found["intervals_95"]["mass_kg"][end].as_f64().unwrap());
+    // The masses of the other bodies may be off, too.
     assert!(
-        low <= 0.3 && 0.3 <= high && high - low < 0.05,
+        low <= 0.3 && 0.3 <= high && high - low < 0.15,
         "{low} {high}"
     );
 }
