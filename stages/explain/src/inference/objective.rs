@@ -375,7 +375,8 @@ mod tests {
     /// Beside the likelihood, the logarithm of the square of the size decides.
     #[test]
     fn an_effect_of_a_hundredth_of_its_usual_size_is_ten_thousand_times_less_likely_beforehand() {
-        let less = gain(1.0) - gain(1e-2);
+        // The normal factor of the prior takes half a nat of the usual size.
+        let less = gain(1.0) + 0.5 - gain(1e-2);
         assert!((less - 2.0 * 100_f64.ln()).abs() < 0.1, "{less}");
         // An effect of no size is as unlikely as one that the noise allows.
         assert!(gain(0.0) < gain(1e-2) - 2.0);
