@@ -27,7 +27,7 @@ const CENTRE_M: f64 = 0.05;
 const TILT_RAD: f64 = 0.1;
 /// Usual offset of a joint's zero \[rad\]. Chosen: 1 degree.
 const ZERO_RAD: f64 = 0.02;
-/// Usual deviation of an unknown torque scale from what gravity tells of it or of the other joints, as a share. Chosen: drives of
+/// Usual deviation of an unknown torque scale from its estimate by gravity, as a share. Chosen: drives of
 /// one arm are alike by order of magnitude.
 const SCALE_SHARE: f64 = 1.0;
 /// Usual deviation of a torque constant, as a share. Chosen: by order of magnitude.

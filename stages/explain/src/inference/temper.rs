@@ -3,9 +3,9 @@
 //! No real arm is as the model says, and thousands of rows then find evidence for anything. The likelihood of each joint is
 //! raised to a power below one instead ("coarsened"; Miller and Dunson, "Robust Bayesian Inference via Coarsening", JASA
 //! 2019): one over the dispersion of the residual in pieces of recordings that are left out, which is Pearson's statistic
-//! over its
-//! degrees of freedom (`McCullagh` and Nelder, *Generalized Linear Models*, 1989, section 4.5). It counts only
-//! the functions of the motion in which effects differ, because everything else is noise.
+//! over its degrees of freedom (`McCullagh` and Nelder, *Generalized Linear Models*, 1989, section 4.5). The median over
+//! the pieces counts, so that an event in one of them is no wrong law. The statistic counts only the functions of the
+//! motion in which effects differ, because everything else is noise.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 

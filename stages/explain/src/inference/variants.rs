@@ -47,7 +47,7 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// The effect with factors that differ so much from their means.
+    /// The effect with these deviations of its factors from their means.
     pub fn with(&self, factors: &[f64]) -> Active {
         if let Some(curve) = &self.curve {
             return curve.with(factors);
@@ -60,7 +60,7 @@ impl Variant {
         self.hypothesis.with(coordinates)
     }
 
-    /// How much the factors of an effect of this kind differ from their means.
+    /// Deviations of an effect's factors from their means.
     pub fn factors_of(&self, active: &Active) -> Vec<f64> {
         if let Some(curve) = &self.curve {
             return curve.factors(&active.coordinates);

@@ -23,8 +23,8 @@ const CONFIDENCE_AMONG: f64 = 0.6;
 /// Statistical: as `verdict::NAMES`.
 const TELLS: f64 = 0.5;
 
-/// Findings for the joints that leave most, where no `unknown` among the findings `said` tells of the joint. `in_amperes`: the
-/// efforts of the recordings are currents.
+/// Findings for the joints with the largest residual, where none of the findings `said` is an `unknown` of the joint.
+/// `in_amperes`: the efforts of the recordings are currents.
 pub fn findings(
     remaining: &[Remaining],
     said: &[Finding],
