@@ -88,7 +88,9 @@ pub fn infer(
         Fit::new(problem, start),
         say,
     );
-    for round in 1.. {
+    let mut round = 0;
+    loop {
+        round += 1;
         say("comparing explanations");
         let sizes = state.sizes(&fit);
         let nuisances = nuisance::of(problem, &fit, &sizes, bodies, state.scales);
@@ -119,7 +121,6 @@ pub fn infer(
         fit = solution.fit;
         follow(problem, &mut state, &space, &fit, &sizes, &nuisances);
     }
-    unreachable!("the last round returns")
 }
 
 /// The first explanation, next to bodies that are as the URDF says and next to bodies with usual errors: the more probable of

@@ -105,8 +105,7 @@ pub fn of_joint(problem: &Problem, fit: &Fit, joint: usize) -> Vec<(Curve, Vec<A
     let mut tables = curves(problem, joint);
     // Friction that follows no law may as well be the other simulation's.
     let is_told = |table: &Table| !(problem.is_foreign && table.by_direction);
-    tables.retain(|table| table.of_joint == joint && table.knots.len() <= MOST_KNOTS);
-    tables.retain(is_told);
+    tables.retain(|table| table.knots.len() <= MOST_KNOTS && is_told(table));
     let of = |table: Table| {
         let curve = Curve::new(table, hypothesis);
         let free = curve.mixing.nrows();

@@ -60,34 +60,16 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
     };
     let even =
         |against, of_joint, count| even_quantiles(readings(problem, against, of_joint), count);
-    // What another simulation leaves at one joint goes with all that moves at the same time.
-    let is_told = |of_joint: &usize| *of_joint == joint || !problem.is_foreign;
-    for of_joint in (0..problem.joints).filter(is_told) {
-        let position = even(Against::Position, of_joint, KNOTS);
-        add(Against::Position, of_joint, position, &[false, true]);
-        // Friction jumps at standstill, so over the joint's own velocity only curves that change sign with the
-        // direction of motion are tried.
-        let signs: &[bool] = if of_joint == joint {
-            &[true]
-        } else {
-            &[false, true]
-        };
-        let velocity = even(Against::Velocity, of_joint, KNOTS);
-        add(Against::Velocity, of_joint, velocity, signs);
-        // A bearing that another joint's load bends or presses rubs more.
-        if of_joint != joint {
-            let load = even(Against::Load, of_joint, KNOTS);
-            add(Against::Load, of_joint, load, &[true]);
-        }
-    }
+    let position = even(Against::Position, joint, KNOTS);
+    add(Against::Position, joint, position, &[false, true]);
+    // Friction jumps at standstill, so over the velocity only curves that change sign with the direction of motion are tried.
+    let velocity = even(Against::Velocity, joint, KNOTS);
+    add(Against::Velocity, joint, velocity, &[true]);
     // Parts that rub on each other feel how fast they move against each other.
-    for of_joint in neighbours(problem, joint)
-        .into_iter()
-        .filter(|_| !problem.is_foreign)
-    {
+    if !problem.is_foreign && is_comparable_to_next(problem, joint) {
         for against in [Against::VelocityDifference, Against::VelocitySum] {
-            let speeds = with_jump(even(against, of_joint, KNOTS));
-            add(against, of_joint, speeds, &[false]);
+            let speeds = with_jump(even(against, joint, KNOTS));
+            add(against, joint, speeds, &[false]);
         }
     }
     for (against, count) in [
@@ -158,13 +140,10 @@ fn session_ends(problem: &Problem, joint: usize) -> Option<[f64; 2]> {
     (first < last).then_some([first, last])
 }
 
-/// The first joint of each pair of neighbours in the URDF that `joint` is one of and whose velocities have one unit.
-pub fn neighbours(problem: &Problem, joint: usize) -> Vec<usize> {
+/// Whether a joint has a next one in the URDF whose velocity has the same unit.
+fn is_comparable_to_next(problem: &Problem, joint: usize) -> bool {
     let slides = |joint: usize| problem.model.joints()[joint].kind == JointKind::Prismatic;
-    let pairs = joint.saturating_sub(1)..(joint + 1).min(problem.joints - 1);
-    pairs
-        .filter(|&first| slides(first) == slides(first + 1))
-        .collect()
+    joint + 1 < problem.joints && slides(joint) == slides(joint + 1)
 }
 
 /// What a curve could be drawn against, at all samples.

@@ -229,9 +229,6 @@ fn describe_curve(active: &Active, parameters: &mut BTreeMap<String, Value>) {
         parameters.insert("largest_nm".to_owned(), number(*most));
         parameters.insert("largest_at".to_owned(), number(*at));
     }
-    if let Some(period) = curve.period {
-        parameters.insert("period_s".to_owned(), Value::from(period));
-    }
 }
 
 /// A force at a link's frame counts as zero if each component is weaker than this \[N\].
