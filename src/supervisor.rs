@@ -140,8 +140,14 @@ async fn supervise(
         told_unready: false,
         first_sample: None,
     };
+    // Caught from before the first stage starts: an interrupt in between would kill this process and
+    // leave the recorders' files incomplete.
+    let signals = [
+        signal(SignalKind::interrupt()).context("cannot catch Ctrl-C")?,
+        signal(SignalKind::terminate()).context("cannot catch SIGTERM")?,
+    ];
     supervisor.start_all()?;
-    supervisor.watch(events).await?;
+    supervisor.watch(events, signals).await;
     let Supervisor { stages, ended, .. } = &supervisor;
     Ok(Summary::new(pipeline, links, stages, *ended))
 }
@@ -168,9 +174,11 @@ struct Supervisor<'a> {
 }
 
 impl Supervisor<'_> {
-    async fn watch(&mut self, mut events: mpsc::Receiver<(Mark, Event)>) -> anyhow::Result<()> {
-        let mut interrupt = signal(SignalKind::interrupt()).context("cannot catch Ctrl-C")?;
-        let mut terminate = signal(SignalKind::terminate()).context("cannot catch SIGTERM")?;
+    async fn watch(
+        &mut self,
+        mut events: mpsc::Receiver<(Mark, Event)>,
+        [mut interrupt, mut terminate]: [Signal; 2],
+    ) {
         let mut look = tokio::time::interval(LOOK_EVERY);
         while !self.is_over() {
             let due = self.stages.iter().filter_map(Local::due).min();
@@ -183,7 +191,6 @@ impl Supervisor<'_> {
             }
             self.close_crews();
         }
-        Ok(())
     }
 
     fn take(&mut self, (crew, life): Mark, event: Event) {
