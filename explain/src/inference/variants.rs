@@ -1,0 +1,392 @@
+//! The hypotheses at the shapes that are tried, with their columns next to an explanation.
+
+use std::sync::Arc;
+
+use tauscope_dynamics::terms::CoordinateKind;
+
+use crate::data::column::Column;
+use crate::data::problem::Problem;
+use crate::fit::fitted::Fit;
+use crate::parallel;
+use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::physics::friction::least;
+use crate::propose::base::Base;
+use crate::propose::grid::shapes;
+
+use super::curves::{self, Curve};
+use super::prior::{self, Magnitude};
+
+/// Effort below which a column is silent, as a share of the joint's. Resolution: of the rounding of efforts.
+const SILENT: f64 = 1e-9;
+/// Usual number of times at which a change may happen. Resolution: that of the scan over a recording.
+const TIMES: f64 = 60.0;
+
+/// A hypothesis at one shape.
+#[derive(Debug)]
+pub struct Variant {
+    /// The effect and its place.
+    pub hypothesis: Hypothesis,
+    /// Its coordinates with the factors at zero.
+    pub shape: Vec<f64>,
+    /// Index of the column that its shape alone adds, if any.
+    pub offset: Option<usize>,
+    /// Index of the first of its factors' columns.
+    pub first: usize,
+    /// Means of the factors.
+    pub centres: Vec<f64>,
+    /// Standard deviations of the factors.
+    pub deviations: Vec<f64>,
+    /// By factor, whether it cannot be negative.
+    pub positive: Vec<bool>,
+    /// Logarithm of the prior \[nats\].
+    pub log_prior: f64,
+    /// Whether every explanation has it.
+    pub is_forced: bool,
+    /// The curve of an `unknown`.
+    pub curve: Option<Curve>,
+}
+
+impl Variant {
+    /// The effect with these deviations of its factors from their means.
+    pub fn with(&self, factors: &[f64]) -> Active {
+        if let Some(curve) = &self.curve {
+            return curve.with(factors);
+        }
+        let mut coordinates = self.shape.clone();
+        let factors = factors.iter().zip(&self.centres);
+        for (&i, (value, centre)) in self.hypothesis.factors().iter().zip(factors) {
+            coordinates[i] = value + centre;
+        }
+        self.hypothesis.with(coordinates)
+    }
+
+    /// Deviations of an effect's factors from their means.
+    pub fn factors_of(&self, active: &Active) -> Vec<f64> {
+        if let Some(curve) = &self.curve {
+            return curve.factors(&active.coordinates);
+        }
+        let factors = self.hypothesis.factors().into_iter().zip(&self.centres);
+        factors
+            .map(|(i, centre)| active.coordinates[i] - centre)
+            .collect()
+    }
+
+    /// Prior means of all coordinates, zero for shapes and times.
+    pub fn all_centres(&self) -> Vec<f64> {
+        if self.curve.is_some() {
+            return self.centres.clone();
+        }
+        let mut all = vec![0.0; self.shape.len()];
+        for (&i, centre) in self.hypothesis.factors().iter().zip(&self.centres) {
+            all[i] = *centre;
+        }
+        all
+    }
+
+    /// Prior standard deviations of all coordinates, infinite for shapes and times.
+    pub fn all_deviations(&self) -> Vec<f64> {
+        if self.curve.is_some() {
+            return self.deviations.clone();
+        }
+        let mut all = vec![f64::INFINITY; self.shape.len()];
+        for (&i, deviation) in self.hypothesis.factors().iter().zip(&self.deviations) {
+            all[i] = *deviation;
+        }
+        all
+    }
+
+    /// Whether one explanation cannot have both: laws nest, so a place has one of all laws that contain the same simplest
+    /// one; a joint's effort is late in one way; and a joint has one unknown law, since sums of several describe anything.
+    pub fn excludes(&self, other: &Self) -> bool {
+        let (own, others) = (self.hypothesis, other.hypothesis);
+        if own.is_of_timing() && others.is_of_timing() {
+            let (a, b) = (own.only_joint(), others.only_joint());
+            return a.is_none() || b.is_none() || a == b;
+        }
+        own.place == others.place && simplest(own) == simplest(others)
+    }
+
+    /// Indices of its columns: the offset, if it has one, and those of its factors.
+    pub fn with_offset(&self) -> std::ops::Range<usize> {
+        self.offset.unwrap_or(self.first)..self.columns().end
+    }
+
+    /// Indices of its factors' columns.
+    pub fn columns(&self) -> std::ops::Range<usize> {
+        self.first..self.first + self.deviations.len()
+    }
+}
+
+/// The columns of a variant, unwhitened.
+pub struct Given {
+    /// The variant; `offset` and `first` are filled in.
+    pub variant: Variant,
+    /// Effort of its shape alone.
+    pub alone: Option<Column>,
+    /// Effort per unit of each factor.
+    pub factors: Vec<Arc<Column>>,
+    /// Whether it changes no compared row, so that no search needs it.
+    pub is_silent: bool,
+}
+
+impl Given {
+    /// Makes it a curve, where its columns are those of the curve's values.
+    fn shape(&mut self, curve: Curve, sizes: &[Magnitude]) {
+        self.factors = curve.mixed(&self.factors);
+        let free = self.factors.len();
+        let usual = prior::USUAL_SHARE * sizes[curve.hypothesis.place.joint].rms;
+        self.variant.deviations = vec![usual; free];
+        self.variant.centres = vec![0.0; free];
+        self.variant.positive = vec![false; free];
+        self.variant.curve = Some(curve);
+    }
+}
+
+/// The simplest law that an effect contains.
+pub fn simplest(hypothesis: Hypothesis) -> &'static str {
+    let effect = hypothesis.effect;
+    effect
+        .simpler
+        .map_or(effect.name, |simpler| simpler.effect.name)
+}
+
+/// Every hypothesis at every shape of its grid, and at its most promising times; the effects of `fit` come first, as they
+/// are. The columns are tangents at `fit`.
+pub fn all(
+    problem: &Problem,
+    fit: &Fit,
+    hypotheses: &[Hypothesis],
+    sizes: &[Magnitude],
+) -> Vec<Given> {
+    let mut all = of_fit(problem, fit, sizes);
+    let jobs: Vec<Hypothesis> = hypotheses.to_vec();
+    let timed = Base::new(problem, fit, hypotheses.len());
+    let of = |hypothesis: &Hypothesis| -> Vec<Given> {
+        let at_times = hypothesis.time_kind() != TimeKind::Always || hypothesis.effect.is_surface();
+        let shapes = if at_times {
+            let proposal = timed.propose_in_time(*hypothesis);
+            proposal.map(|p| vec![p.active.shape()]).unwrap_or_default()
+        } else {
+            shapes(problem, *hypothesis)
+        };
+        let count = shapes.len();
+        let given = shapes
+            .into_iter()
+            .map(|shape| at(problem, fit, *hypothesis, shape, count, sizes));
+        given.flatten().collect()
+    };
+    all.extend(parallel::map(&jobs, of).into_iter().flatten());
+    let joints: Vec<usize> = (0..problem.joints).collect();
+    let curves = |&joint: &usize| of_curves(problem, fit, joint, sizes);
+    all.extend(parallel::map(&joints, curves).into_iter().flatten());
+    all
+}
+
+/// The curves that are tried at a joint.
+fn of_curves(problem: &Problem, fit: &Fit, joint: usize, sizes: &[Magnitude]) -> Vec<Given> {
+    let all = curves::of_joint(problem, fit, joint);
+    let count = all.len();
+    let of = |(curve, columns): (Curve, Vec<Arc<Column>>)| {
+        let own = (None, columns);
+        let mut given = given(problem, curve.hypothesis, Vec::new(), own, count, sizes);
+        given.shape(curve, sizes);
+        (!given.is_silent).then_some(given)
+    };
+    all.into_iter().filter_map(of).collect()
+}
+
+/// The effects of a fit as they are, one each, in their order.
+pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[Magnitude]) -> Vec<Given> {
+    let jacobian = fit.jacobian(problem);
+    let free = fit.parameters();
+    let of = |(i, active): (usize, &Active)| {
+        let own = free.iter().zip(&jacobian);
+        let own = own.filter(|((of, c), _)| *of == i && fit.is_factor(i, *c));
+        let factors: Vec<(f64, Arc<Column>)> = own
+            .map(|((_, c), column)| {
+                let centre = prior::centre(problem, active.hypothesis);
+                (active.coordinates[*c] - centre, Arc::clone(column))
+            })
+            .collect();
+        // The intercept of the tangent: the effect's effort less that of its factors.
+        let joint = active.hypothesis.only_joint();
+        let mut alone = total(problem, fit, i, joint);
+        for (factor, column) in &factors {
+            for (k, value) in alone.values.iter_mut().enumerate() {
+                let of = match (joint, column.joint) {
+                    (Some(_), Some(_)) | (None, None) => column.values[k],
+                    (Some(own), None) => column.values[own * problem.rows + k],
+                    (None, Some(own)) if k / problem.rows == own => column.values[k % problem.rows],
+                    (None, Some(_)) => 0.0,
+                };
+                *value -= factor * of;
+            }
+        }
+        let largest = alone
+            .values
+            .iter()
+            .fold(0.0_f64, |most, x| most.max(x.abs()));
+        let most_effort = sizes.iter().map(|size| size.rms).fold(0.0, f64::max);
+        let alone = (largest > 1e-6 * most_effort).then_some(alone);
+        let factors: Vec<Arc<Column>> = factors.into_iter().map(|(_, column)| column).collect();
+        // At its best shape an effect is as probable beforehand as at any other of its grid.
+        let count = match active.hypothesis.time_kind() {
+            TimeKind::Always => shapes(problem, active.hypothesis).len(),
+            _ => 1,
+        };
+        let mut given = given(
+            problem,
+            active.hypothesis,
+            active.shape(),
+            (alone, factors),
+            count,
+            sizes,
+        );
+        if let Some(table) = &active.curve {
+            given.shape(Curve::new(table.clone(), active.hypothesis), sizes);
+        }
+        given
+    };
+    fit.actives.iter().enumerate().map(of).collect()
+}
+
+/// Effort of one effect of a fit.
+fn total(problem: &Problem, fit: &Fit, index: usize, joint: Option<usize>) -> Column {
+    let less = fit.without(problem, index);
+    let rows = joint.map_or(0..problem.joints * problem.rows, |j| problem.joint_rows(j));
+    let pairs = less.residual[rows.clone()].iter().zip(&fit.residual[rows]);
+    Column {
+        joint,
+        values: pairs.map(|(less, with)| less - with).collect(),
+    }
+}
+
+/// The measured effort, less what the twin without the effects of `fit` explains, as far as that is the sum of the
+/// effects' own efforts.
+pub fn measured(problem: &Problem, fit: &Fit) -> Column {
+    let mut values = fit.residual.clone();
+    for (i, active) in fit.actives.iter().enumerate() {
+        let total = total(problem, fit, i, active.hypothesis.only_joint());
+        let first = total.joint.map_or(0, |joint| joint * problem.rows);
+        for (value, add) in values[first..].iter_mut().zip(&total.values) {
+            *value += add;
+        }
+    }
+    Column {
+        joint: None,
+        values,
+    }
+}
+
+/// A hypothesis at one of the `count` shapes of its grid; `None` if it changes no compared row.
+pub fn at(
+    problem: &Problem,
+    fit: &Fit,
+    hypothesis: Hypothesis,
+    shape: Vec<f64>,
+    count: usize,
+    sizes: &[Magnitude],
+) -> Option<Given> {
+    let columns = fit.columns(problem, hypothesis, &shape);
+    let alone = columns.alone.clone();
+    let given = given(
+        problem,
+        hypothesis,
+        shape,
+        (alone, columns.factors.clone()),
+        count,
+        sizes,
+    );
+    (!given.is_silent).then_some(given)
+}
+
+/// A variant with its columns.
+fn given(
+    problem: &Problem,
+    hypothesis: Hypothesis,
+    shape: Vec<f64>,
+    (alone, factors): (Option<Column>, Vec<Arc<Column>>),
+    count: usize,
+    sizes: &[Magnitude],
+) -> Given {
+    let share = |column: &Column| {
+        let of = |joint: usize| {
+            let values = column.of_joint(joint, problem.rows)?;
+            let weight = &problem.weight[problem.joint_rows(joint)];
+            let counted = values.iter().zip(weight).filter(|(_, w)| **w > 0.0);
+            let peak = counted.fold(0.0_f64, |most, (x, _)| most.max(x.abs()));
+            Some(peak / sizes[joint].peak)
+        };
+        (0..problem.joints).filter_map(of).fold(0.0, f64::max)
+    };
+    let shares: Vec<f64> = factors.iter().map(|column| share(column)).collect();
+    let of_shape = alone.as_ref().map(share);
+    let is_silent = shares.iter().chain(&of_shape).all(|share| *share <= SILENT);
+    let positive = hypothesis
+        .effect
+        .coordinates
+        .iter()
+        .filter_map(|c| match c.kind {
+            CoordinateKind::Factor { minimum, .. } => {
+                Some(least(problem, hypothesis, minimum) >= 0.0)
+            }
+            _ => None,
+        });
+    let times = match hypothesis.time_kind() {
+        TimeKind::Always => 0.0,
+        TimeKind::Step => TIMES.ln(),
+        TimeKind::EveryRecording | TimeKind::Once => 2.0 * TIMES.ln(),
+    };
+    let is_forced = hypothesis.is_torque_scale();
+    let log_prior = if is_forced {
+        0.0
+    } else {
+        hypothesis.effect.odds_nats - (count as f64).ln() - times
+    };
+    Given {
+        variant: Variant {
+            hypothesis,
+            shape,
+            offset: None,
+            first: 0,
+            centres: vec![prior::centre(problem, hypothesis); shares.len()],
+            deviations: prior::deviations(
+                problem,
+                hypothesis,
+                &shares,
+                sizes[hypothesis.place.joint],
+            ),
+            positive: positive.collect(),
+            log_prior,
+            is_forced,
+            curve: None,
+        },
+        alone,
+        factors,
+        is_silent,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{at_joint, problem_with};
+
+    /// Guards the indices of the effects of a fit: a delay that was refined to zero changes no row.
+    #[test]
+    fn an_effect_that_changes_nothing_keeps_its_place() {
+        let problem = problem_with(4, |_, _, _| {});
+        let actives = vec![
+            at_joint("torque_delay", 0).with(vec![0.0]),
+            at_joint("viscous_friction", 1).with(vec![0.5]),
+        ];
+        let fit = Fit::new(&problem, actives);
+        let one = Magnitude {
+            rms: 1.0,
+            peak: 1.0,
+        };
+        let given = of_fit(&problem, &fit, &[one, one]);
+        let silent: Vec<bool> = given.iter().map(|given| given.is_silent).collect();
+        assert_eq!(silent, [true, false]);
+    }
+}
