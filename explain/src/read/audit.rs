@@ -1,0 +1,150 @@
+//! Checks whether the recordings allow a verdict, and counts what was lost on reading them.
+
+use tauscope_session::by_recording;
+
+use crate::read::input::Input;
+use crate::read::recording::Recording;
+
+/// A joint that is faster than this counts as moving \[rad/s or m/s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+pub const MOVES: f64 = 0.02;
+/// A verdict needs a joint that moves for at least this long \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_MOTION_S: f64 = 1.0;
+/// That joint must move further than this in some recording, because a push bends even an arm that holds still
+/// \[rad or m\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_RANGE: f64 = 0.05;
+/// A recording with fewer samples than this is too short.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_SAMPLES: usize = 50;
+/// A recording shorter than this is too short \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_DURATION_S: f64 = 1.0;
+/// Speed is the change of position over this time, so that encoder noise does not count as motion \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const SPEED_SPAN_S: f64 = 0.1;
+
+/// The reason why these recordings allow no verdict, if there is one. Nothing has been fitted yet.
+pub fn before(input: &Input) -> Option<String> {
+    if let Some(recording) = input.fit.iter().find(|r| r.effort.is_empty()) {
+        return Some(format!("recording {} holds no effort", recording.name));
+    }
+    if !input.bodies && input.fit.iter().any(|r| r.reference.is_empty()) {
+        return Some("the twin's effort is a topic, and a recording does not have it".to_owned());
+    }
+    if input.fit.iter().all(|r| r.effort.iter().all(|x| *x == 0.0)) {
+        return Some("the effort is zero throughout, so it is not measured".to_owned());
+    }
+    if let Some(recording) = input
+        .fit
+        .iter()
+        .find(|r| r.len() < LEAST_SAMPLES || r.duration_s() < LEAST_DURATION_S)
+    {
+        return Some(format!(
+            "recording {} holds {} samples over {:.2} s, which is too short",
+            recording.name,
+            recording.len(),
+            recording.duration_s()
+        ));
+    }
+    if input.fit.len() + input.holdout.len() < 2 && input.start.is_none() && !at_rest(input) {
+        return Some(
+            "there is only one recording, and a fit must be tested on another one. Record the same arm once more, \
+             with another motion, or start from a corrected twin"
+                .to_owned(),
+        );
+    }
+    None
+}
+
+/// Whether no joint moves long and far enough for a verdict on lasting effects.
+pub fn at_rest(input: &Input) -> bool {
+    let n = input.model.dof();
+    let stays = |j: usize| input.fit.iter().all(|r| range(r, j, n) < LEAST_RANGE);
+    (0..n).all(|j| moving_s(&input.fit, j, n) < LEAST_MOTION_S || stays(j))
+}
+
+/// Whether no position ever changes, not even by one encoder step: the driver does not publish positions.
+pub fn is_frozen(recording: &Recording, n: usize) -> bool {
+    (0..n).all(|j| range(recording, j, n) <= 0.0)
+}
+
+/// Whether a joint's effort stays the same to the last bit while the joint moves: nobody measures it.
+pub fn is_unmeasured(recording: &Recording, joint: usize, n: usize) -> bool {
+    let mut efforts = recording.effort.iter().skip(joint).step_by(n);
+    let first = efforts.next();
+    range(recording, joint, n) > LEAST_RANGE && efforts.all(|effort| Some(effort) == first)
+}
+
+/// How far a joint moves in a recording \[rad or m\].
+fn range(recording: &Recording, joint: usize, n: usize) -> f64 {
+    let positions = recording.position.iter().skip(joint).step_by(n);
+    let ends = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = positions.fold(ends, |(low, high), q| (low.min(*q), high.max(*q)));
+    high - low
+}
+
+/// How long a joint moves \[s\].
+fn moving_s(recordings: &[Recording], joint: usize, n: usize) -> f64 {
+    let mut sum = 0.0;
+    for recording in recordings {
+        let rate = recording.len() as f64 / recording.duration_s().max(1e-3);
+        let reach = ((SPEED_SPAN_S * rate) as usize).max(1);
+        for k in reach..recording.len() {
+            let change =
+                recording.position[k * n + joint] - recording.position[(k - reach) * n + joint];
+            let passed = recording.time_s[k] - recording.time_s[k - reach];
+            if change.abs() > MOVES * passed {
+                sum += recording.time_s[k] - recording.time_s[k - 1];
+            }
+        }
+    }
+    sum
+}
+
+/// Faults of each recording, a sentence each: the findings on reading, the unused parts, and the clock that stamps were
+/// put on.
+pub fn losses(input: &Input) -> Vec<String> {
+    let recordings = || input.fit.iter().chain(&input.holdout);
+    let found: Vec<_> = recordings()
+        .map(|recording| (recording.name.clone(), recording.findings.clone()))
+        .collect();
+    let mut notes = by_recording(&found);
+    for recording in recordings() {
+        let name = &recording.name;
+        let losses = &recording.losses;
+        let counted = [
+            (losses.repeated, "rows repeat a stamp and its values"),
+            (
+                losses.stale,
+                "rows repeat the measurement of the row before under a new stamp",
+            ),
+            (
+                losses.unmeasured,
+                "rows hold no effort, or zeros at all joints, and are not used: another publisher, or drives that were off",
+            ),
+            (
+                losses.damaged,
+                "parts of the file cannot be read, e.g. a torn tail",
+            ),
+        ];
+        for (count, what) in counted.into_iter().filter(|(count, _)| *count > 0) {
+            notes.push(format!("{name}: {count} {what}."));
+        }
+        if let Some(clock) = &recording.clock {
+            notes.push(clock.note(name, recording.is_timed_by_log()));
+        }
+    }
+    for recording in &input.holdout {
+        let lost = recording.sample_of_row.iter().filter(|it| it.is_none());
+        let lost = lost.count();
+        if lost > 0 {
+            notes.push(format!(
+                "{}: the predictions of the {lost} rows that were left out are NaN in the table of predictions.",
+                recording.name
+            ));
+        }
+    }
+    notes
+}

@@ -1,0 +1,89 @@
+//! Excerpts of long sessions: the time that a search takes grows with what it is given, what it finds does not.
+
+use crate::read::recording::Recording;
+
+/// A longer session is fitted in excerpts \[s\].
+/// Tuned: for what it costs in time, on no recorded seeds; not swept.
+const LONGEST_S: f64 = 400.0;
+/// How long an excerpt is \[s\].
+/// Physical: some strokes of a pick-and-place motion, between rests.
+const EXCERPT_S: f64 = 20.0;
+
+/// What was kept of a session.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Excerpts {
+    /// How long it is \[s\].
+    pub whole_s: f64,
+    /// How much of it was kept \[s\].
+    pub kept_s: f64,
+}
+
+/// Keeps excerpts of recordings that are longer than [`LONGEST_S`] together, spread evenly over each of them. `None` if they
+/// are not.
+pub fn excerpts(recordings: &mut [Recording]) -> Option<Excerpts> {
+    let length_s =
+        |recordings: &[Recording]| recordings.iter().map(Recording::duration_s).sum::<f64>();
+    let whole_s = length_s(recordings);
+    if whole_s <= LONGEST_S {
+        return None;
+    }
+    // One of so many stretches of an excerpt's length is kept.
+    let one_in = whole_s / LONGEST_S;
+    for recording in &mut *recordings {
+        let is_kept = |time_s: &f64| {
+            let stretch = (time_s / EXCERPT_S).floor();
+            // The first one, then each that crosses the next multiple.
+            (stretch / one_in).ceil() * one_in < stretch + 1.0
+        };
+        let kept: Vec<bool> = recording.time_s.iter().map(is_kept).collect();
+        recording.keep(&kept);
+    }
+    let gaps_s = |recording: &Recording| -> f64 {
+        let steps = recording.time_s.windows(2).map(|pair| pair[1] - pair[0]);
+        steps.filter(|step| *step > 0.5 * EXCERPT_S).sum()
+    };
+    let kept_s = length_s(recordings) - recordings.iter().map(gaps_s).sum::<f64>();
+    Some(Excerpts { whole_s, kept_s })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{model, recording};
+
+    /// Recordings of these lengths at 1 Hz \[s\].
+    fn session(lengths_s: &[usize]) -> Vec<Recording> {
+        let of = |length: &usize| {
+            let mut one = recording(&model(), 1, |_, _, _| {});
+            one.time_s = (0..=*length).map(|k| k as f64).collect();
+            for column in [&mut one.position, &mut one.velocity, &mut one.effort] {
+                column.resize(2 * (length + 1), 0.0);
+            }
+            one.sample_of_row = (0..=*length).map(Some).collect();
+            one
+        };
+        lengths_s.iter().map(of).collect()
+    }
+
+    #[test]
+    fn a_session_of_minutes_is_fitted_whole() {
+        let mut all = session(&[100, 200]);
+        assert_eq!(excerpts(&mut all), None);
+        assert_eq!(all[1].len(), 201);
+    }
+
+    #[test]
+    fn of_an_hour_stretches_of_every_recording_are_kept() {
+        let mut all = session(&[1800, 1200, 600]);
+        let said = excerpts(&mut all).unwrap();
+        assert!((said.whole_s - 3600.0).abs() < 1e-9);
+        assert!((300.0..500.0).contains(&said.kept_s), "{said:?}");
+        for (recording, whole_s) in all.iter().zip([1800.0, 1200.0, 600.0]) {
+            let share = recording.len() as f64 / whole_s;
+            assert!((0.08..0.16).contains(&share), "{share} of {whole_s} s");
+            assert!(recording.time_s.last().unwrap() > &(0.6 * whole_s));
+            assert_eq!(recording.position.len(), 2 * recording.len());
+            assert_eq!(recording.losses.lost(), 0);
+        }
+    }
+}

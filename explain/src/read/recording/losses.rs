@@ -1,0 +1,129 @@
+//! What a recording loses on reading.
+
+use super::Recording;
+
+/// Messages and rows that were left out on reading.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Losses {
+    /// Messages and states that were refused; the findings name the reasons.
+    pub refused: u64,
+    /// Rows that repeat the stamp and the values of the row before.
+    pub repeated: u64,
+    /// Rows of an arm that moves that repeat all values of the row before: the measurement is an old one.
+    pub stale: u64,
+    /// Rows whose efforts are no measurement, among others whose efforts are.
+    pub unmeasured: u64,
+    /// Messages that could not be decoded.
+    pub unreadable: u64,
+    /// Parts of the file that cannot be read, e.g. a torn tail.
+    pub damaged: u64,
+}
+
+impl Losses {
+    /// Rows of data that are lost, repeats not counted.
+    pub fn lost(&self) -> u64 {
+        self.refused + self.unmeasured + self.unreadable + self.damaged
+    }
+}
+
+impl Recording {
+    /// Leaves out the samples that are not `measured`: nobody measured their efforts.
+    pub(super) fn keep_measured(&mut self, measured: &[bool]) {
+        let unmeasured = measured.iter().filter(|is_measured| !**is_measured);
+        self.losses.unmeasured += unmeasured.count() as u64;
+        self.keep(measured);
+    }
+
+    /// Leaves out the samples that repeat every value of the one before although some joint has a velocity. A driver that
+    /// publishes faster than it reads sends old measurements with new stamps; a position that waits and then catches up
+    /// has a velocity that no arm had.
+    pub(super) fn leave_out_stale(&mut self) {
+        let count = self.len();
+        let n = self.position.len() / count.max(1);
+        let same = |all: &[f64], k: usize| {
+            all.is_empty() || all[k * n..(k + 1) * n] == all[(k - 1) * n..k * n]
+        };
+        let moves = |k: usize| {
+            let own = self.velocity.get(k * n..(k + 1) * n).unwrap_or_default();
+            own.iter().any(|velocity| *velocity != 0.0)
+        };
+        let is_stale = |k: usize| {
+            let all = [&self.position, &self.velocity, &self.effort];
+            k > 0 && moves(k) && all.iter().all(|values| same(values, k))
+        };
+        let is_fresh: Vec<bool> = (0..count).map(|k| !is_stale(k)).collect();
+        let stale = is_fresh.iter().filter(|is_fresh| !**is_fresh).count();
+        if stale > 0 {
+            self.losses.stale = stale as u64;
+            self.keep(&is_fresh);
+        }
+    }
+
+    /// Keeps these samples alone. The rows of the others are answered by the sample before.
+    pub(crate) fn keep(&mut self, is_kept: &[bool]) {
+        let n = self.position.len() / is_kept.len().max(1);
+        let kept: Vec<usize> = (0..is_kept.len()).filter(|&k| is_kept[k]).collect();
+        let rows = |all: &[f64]| -> Vec<f64> {
+            let row = |&k: &usize| all.get(k * n..(k + 1) * n).unwrap_or_default().iter();
+            kept.iter().flat_map(row).copied().collect()
+        };
+        for all in [
+            &mut self.position,
+            &mut self.velocity,
+            &mut self.effort,
+            &mut self.reference,
+        ] {
+            *all = rows(all);
+        }
+        let start_s = kept.first().map_or(0.0, |&first| self.time_s[first]);
+        self.start_ns += (start_s * 1e9).round() as i64;
+        self.time_s = kept.iter().map(|&k| self.time_s[k] - start_s).collect();
+        let now_at = |sample: usize| kept.partition_point(|&k| k <= sample).saturating_sub(1);
+        for sample in self.sample_of_row.iter_mut().flatten() {
+            *sample = now_at(*sample);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::fixture;
+
+    #[test]
+    fn old_measurements_with_new_stamps_are_left_out_while_the_arm_moves() {
+        let mut recording = fixture::recording(&fixture::model(), 3, |_, _, _| {});
+        recording.velocity = vec![0.1; recording.position.len()];
+        let whole = recording.clone();
+        for values in [&mut recording.position, &mut recording.effort] {
+            values.copy_within(10..12, 12);
+            values.copy_within(10..12, 14);
+        }
+        let mut still = recording.clone();
+        recording.leave_out_stale();
+        assert_eq!(recording.losses.stale, 2);
+        assert_eq!(recording.time_s[6], whole.time_s[8]);
+        assert_eq!(recording.sample_of_row[4..9], [4, 5, 5, 5, 6].map(Some));
+        // An arm at rest measures the same again.
+        still.velocity.fill(0.0);
+        still.leave_out_stale();
+        assert_eq!(still.len(), whole.len());
+    }
+
+    #[test]
+    fn samples_without_a_measurement_are_left_out_and_their_rows_answered_by_the_one_before() {
+        let mut recording = fixture::recording(&fixture::model(), 3, |_, _, _| {});
+        let whole = recording.clone();
+        let count = whole.len();
+        recording.sample_of_row = (0..count).map(Some).collect();
+        let measured: Vec<bool> = (0..count).map(|k| k > 0 && k % 3 != 0).collect();
+        recording.keep_measured(&measured);
+        assert_eq!(recording.losses.unmeasured as usize, count.div_ceil(3));
+        assert_eq!(recording.len(), count - count.div_ceil(3));
+        assert_eq!(
+            recording.position[..4],
+            [&whole.position[2..4], &whole.position[4..6]].concat()
+        );
+        assert!(recording.time_s[0] == 0.0 && recording.start_ns > whole.start_ns);
+        assert_eq!(recording.sample_of_row[..6], [0, 0, 1, 1, 2, 3].map(Some));
+    }
+}
