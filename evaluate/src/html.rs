@@ -10,8 +10,8 @@ mod tuning;
 use std::collections::BTreeMap;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use tauscope_explain::html::{POLICY, STYLE};
 use tauscope_pipeline::provenance;
+use tauscope_report::{POLICY, STYLE};
 
 use crate::evaluation::Evaluation;
 use crate::judged::Judged;

@@ -118,21 +118,6 @@ impl Cell {
         })
     }
 
-    /// The same cell with those joints fixed that are not `recorded`, and what is said of it; see [`Fixed::unrecorded`].
-    #[must_use]
-    pub fn without_unrecorded(mut self, recorded: &[String]) -> (Self, Option<String>) {
-        let robot = self.facts.urdf.as_deref().zip(self.model.as_ref());
-        let fixed = robot.and_then(|(urdf, model)| Fixed::unrecorded(urdf, model, recorded));
-        let Some(fixed) = fixed else {
-            return (self, None);
-        };
-        let note = fixed.note();
-        self.facts.joint_names = fixed.model.joint_names().map(str::to_owned).collect();
-        self.facts.urdf = Some(fixed.urdf);
-        self.model = Some(fixed.model);
-        (self, Some(note))
-    }
-
     /// By joint, the effort limit of the robot file \[N m or N\]; empty without a robot.
     pub fn effort_limits(&self) -> Vec<Option<f64>> {
         let joints = self.model.iter().flat_map(Model::joints);

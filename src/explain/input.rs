@@ -122,7 +122,7 @@ pub fn without(effects: &[String]) -> Result<BTreeSet<String>, Report> {
     let known = || {
         let named = EFFECTS.iter().filter(|effect| ***effect != UNKNOWN);
         let named = named.map(|effect| effect.name);
-        named.chain(tauscope_explain::report::recording_faults())
+        named.chain(tauscope_explain::report::slip_words::recording_faults())
     };
     for effect in effects {
         if !known().any(|name| name == effect) {

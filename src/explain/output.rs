@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use tauscope_archive::whole_file;
+use tauscope_explain::Outcome;
 use tauscope_explain::report::{MOTION_PREFIX, Verdict};
-use tauscope_explain::{Outcome, html};
+use tauscope_report as html;
 
 use super::input::Request;
 use super::read::Kept;

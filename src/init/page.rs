@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use tauscope_dynamics::Model;
-use tauscope_explain::html;
 use tauscope_explain::report::{Report, Verdict};
 use tauscope_pipeline::cell::{Cell, EffortUnit};
+use tauscope_report as html;
 
 use super::folder::Folder;
 use super::learn::Learnt;

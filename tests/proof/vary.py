@@ -5,7 +5,7 @@
     python vary.py OUT --groups [--seed 1]                                 # all at once with random signs, halved where something changes
 
 The tree is copied to OUT/tree and built once, with every such constant scaled by what the environment says (vary_source.py). A variation
-then costs the cases: `--cases` small arms (reliability.py, from seed `--first` on) for constants of stages/explain and dynamics, `--sets`
+then costs the cases: `--cases` small arms (reliability.py, from seed `--first` on) for constants of explain and dynamics, `--sets`
 simulated sets of hands on random paths (tests/contacts/paths.py) for those of stages/detect. Printed are findings that come or go, by name and place,
 F1, the error on the hold-out, contacts found and false alarms. All runs are kept in OUT and not made again.
 """
@@ -80,7 +80,7 @@ class Lab:
         only = {self.constants[i].crate for i in factors}
         for seed in self.seeds if only != {"stages/detect"} else []:
             seen.setdefault(f"case {seed}", None) or seen.update({f"case {seed}": self.explained(seed, text)})
-        for folder in self.sets if not only or "stages/explain" not in only or len(only) > 1 else []:
+        for folder in self.sets if not only or "explain" not in only or len(only) > 1 else []:
             key = f"set {folder.name}"
             seen.setdefault(key, None) or seen.update({key: self.evaluated(folder, text)})
         kept.parent.mkdir(parents=True, exist_ok=True)

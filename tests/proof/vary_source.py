@@ -13,7 +13,7 @@ import re
 import shutil
 import subprocess
 
-CRATES = ["stages/explain", "stages/detect", "dynamics"]
+CRATES = ["explain", "stages/detect", "dynamics"]
 CONST = re.compile(r"^\s*(?:pub(?:\([^)]*\))?\s+)?const\s+([A-Z][A-Z0-9_]*)\s*:\s*([^=]+?)\s*=\s*(.*)$")
 TEXT = re.compile(r'"(?:\\.|[^"\\])*"')
 MODULE = """//! Scales constants; made by tests/proof/vary.py in a copy of the tree.

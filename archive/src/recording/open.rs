@@ -54,19 +54,6 @@ impl Recording {
         Self::open_file(path)
     }
 
-    /// As [`Recording::open`], but refuses what [`Recording::check_comparable`] does.
-    ///
-    /// # Errors
-    /// Of both.
-    pub fn open_comparable(
-        path: impl AsRef<Path>,
-        joints: &[String],
-    ) -> Result<Self, ArchiveError> {
-        let recording = Self::open(path)?;
-        recording.check_comparable(joints)?;
-        Ok(recording)
-    }
-
     fn open_file(path: &Path) -> Result<Self, ArchiveError> {
         let mut beginning = Vec::new();
         File::open(path)

@@ -2,8 +2,8 @@
 
 use super::law::joint_law;
 use super::{
-    Against, Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simpler,
-    Simulated, Traits, Words, sign,
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simpler, Simulated,
+    Traits, Words, sign,
 };
 
 /// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset.
@@ -59,10 +59,7 @@ pub(super) static EFFECT: Effect = Effect {
             ]
         })
     }),
-    traits: Traits {
-        drawn_over: Some(Against::Velocity),
-        ..Traits::NONE
-    },
+    traits: Traits::NONE,
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[forward, backward], j, at| {
             let direction = sign(at.velocity[j]);

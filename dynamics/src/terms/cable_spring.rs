@@ -2,8 +2,8 @@
 
 use super::law::joint_law;
 use super::{
-    Against, Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated,
-    Traits, Words,
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
+    Words,
 };
 use crate::Limits;
 
@@ -67,10 +67,7 @@ pub(super) static EFFECT: Effect = Effect {
             ]
         })
     }),
-    traits: Traits {
-        drawn_over: Some(Against::Position),
-        ..Traits::NONE
-    },
+    traits: Traits::NONE,
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[stiffness, constant], j, at| {
             stiffness * at.position[j] + constant

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use super::law::joint_law;
 use super::{
-    Against, Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated,
-    Traits, Words,
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
+    Words,
 };
 
 /// Effort A sin(q - q0), searched as A cos q0 sin q - A sin q0 cos q.
@@ -42,10 +42,7 @@ pub(super) static EFFECT: Effect = Effect {
             vec![("amplitude_nm", f), ("rest_angle_rad", rest)]
         })
     }),
-    traits: Traits {
-        drawn_over: Some(Against::Position),
-        ..Traits::NONE
-    },
+    traits: Traits::NONE,
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[sine, cosine], j, at| {
             let (sin, cos) = at.position[j].sin_cos();

@@ -2,8 +2,7 @@
 
 use super::concealed::{Draw, Drawn};
 use super::words::Words;
-use super::{Against, Site, Term, UNKNOWN};
-use crate::Link;
+use super::{Site, Term, UNKNOWN};
 
 mod parameter;
 #[cfg(test)]
@@ -218,8 +217,6 @@ pub struct Compliance {
     reason = "each is a fact of its own, told by name in the few files that give it"
 )]
 pub struct Traits {
-    /// A curve without a name over this of its own joint draws it, too.
-    pub drawn_over: Option<Against>,
     /// How many of it there may be at one place.
     pub most_at_one_place: usize,
     /// Where two at one place are said as one finding: the names of the second one's parameters.
@@ -241,17 +238,11 @@ pub struct Traits {
     /// It has a law and a name here, but the list of names that reports may use lacks it. A finding is an `unknown` whose
     /// parameter `kind` is this name, so that who reads reports by that list sees an honest `unknown` with numbers.
     pub is_off_list: bool,
-    /// It holds a joint that stands still, with any effort up to its own; told here of what does not jump at every reversal.
-    pub holds_at_rest: bool,
     /// The number of its simpler effect, from its coordinates and a time of the session \[s\], if that changes all the time.
     /// Its coordinates are that number at the start of the session and its growth.
     pub drifts: Option<fn(&[f64], f64) -> f64>,
     /// Its effort is linear in its factors to first order only, so it is computed anew for each of their values.
     pub bends: bool,
-    /// Whether some gear makes it with these coordinates; what none makes only draws a curve.
-    pub is_made_by_gears: fn(&[f64]) -> bool,
-    /// By how much each of its coordinates may be off in a URDF that nobody has measured, of this link.
-    pub off_in_urdf: Option<fn(&Link) -> f64>,
     /// It acts through the whole of one recording: its two times are those of a recording's ends.
     pub fills_recording: bool,
     /// It acts from the start of the session to some time, or from some time to its end, in several recordings perhaps.
@@ -265,7 +256,6 @@ pub struct Traits {
 impl Traits {
     /// Nothing of all that.
     pub const NONE: Self = Self {
-        drawn_over: None,
         most_at_one_place: 1,
         second: &[],
         needs_load: false,
@@ -276,11 +266,8 @@ impl Traits {
         is_scale: false,
         describes_only: false,
         is_off_list: false,
-        holds_at_rest: false,
         drifts: None,
         bends: false,
-        is_made_by_gears: |_| true,
-        off_in_urdf: None,
         fills_recording: false,
         in_session: false,
         is_followed: false,

@@ -2,8 +2,8 @@
 
 use super::law::joint_law;
 use super::{
-    Against, Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, Parameter,
-    PlaceKind, Simpler, Simulated, Traits, Words, sign,
+    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind,
+    Simpler, Simulated, Traits, Words, sign,
 };
 
 /// A change of friction smaller than this share of it is what friction does from day to day.
@@ -63,10 +63,7 @@ pub(super) static EFFECT: Effect = Effect {
             ]
         })
     }),
-    traits: Traits {
-        drawn_over: Some(Against::Velocity),
-        ..Traits::NONE
-    },
+    traits: Traits::NONE,
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[before, after, time_s], j, at| {
             let coulomb = at.stepped([*before, *after], *time_s);

@@ -45,7 +45,6 @@ pub(super) static EFFECT: Effect = Effect {
     }),
     traits: Traits {
         is_off_list: true,
-        holds_at_rest: true,
         ..Traits::NONE
     },
     build: |site, values| Box::new(LateBrake::new(site, array(values))),

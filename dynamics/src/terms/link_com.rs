@@ -12,10 +12,7 @@ use crate::kinematic_tree::length_m;
 /// long by its frames: from one end to the other. Physical: a uniform rod ends the root of 3 radii of gyration from its centre (its moment of
 /// inertia is m l²/12), a plumper body nearer.
 const MOST_GYRATIONS: f64 = 1.732;
-/// How far it may be off in a URDF, in radii of gyration.
-/// Tuned: a guess at how exact URDFs are; not swept.
-const CENTRE_OFF: f64 = 0.2;
-/// The same where one is drawn, at most \[m\].
+/// Where one is drawn, it is off by this at most \[m\].
 /// Tuned: for simulated cells only; not swept.
 const MOST_DRAWN_M: f64 = 0.06;
 
@@ -58,10 +55,7 @@ pub static EFFECT: Effect = Effect {
         let names = ["delta_com_x_m", "delta_com_y_m", "delta_com_z_m"];
         Drawn::new([1e-4, MOST_DRAWN_M], draw.along(names))
     }),
-    traits: Traits {
-        off_in_urdf: Some(|link| CENTRE_OFF * link.gyration_radius_m()),
-        ..Traits::NONE
-    },
+    traits: Traits::NONE,
     build: |site, values| {
         let link = &site.model.links()[site.link];
         let (mass_kg, com_m) = (link.mass_kg(), link.com_m());

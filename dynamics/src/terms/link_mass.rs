@@ -7,9 +7,6 @@ use super::{
 };
 use crate::Inertia;
 
-/// How far a link's mass may be off in a URDF, as a share of it.
-/// Tuned: a guess at how exact URDFs are; not swept.
-const MASS_OFF: f64 = 0.1;
 /// The same where one is drawn, at most.
 /// Tuned: for simulated cells only; not swept.
 const MOST_DRAWN: f64 = 0.6;
@@ -44,10 +41,7 @@ pub(super) static EFFECT: Effect = Effect {
         let most = MOST_DRAWN * draw.site.model.links()[draw.site.link].mass_kg();
         Drawn::new([1e-3 * most, most], |mass| vec![("delta_mass_kg", mass)])
     }),
-    traits: Traits {
-        off_in_urdf: Some(|link| MASS_OFF * link.mass_kg()),
-        ..Traits::NONE
-    },
+    traits: Traits::NONE,
     build: |site, values| {
         let com_m = site.model.links()[site.link].com_m();
         let inertia = Inertia::new(values[0], com_m, [0.0; 6]);

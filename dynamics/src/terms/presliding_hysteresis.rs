@@ -2,8 +2,8 @@
 
 use super::law::array;
 use super::{
-    Against, Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
-    PlaceKind, Scale, Simpler, Simulated, Site, Term, Traits, Words,
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
+    Scale, Simpler, Simulated, Site, Term, Traits, Words,
 };
 
 /// A joint breaks away within this: bristles that give more are a spring \[rad or m\].
@@ -59,7 +59,6 @@ pub(super) static EFFECT: Effect = Effect {
         })
     }),
     traits: Traits {
-        drawn_over: Some(Against::Velocity),
         is_fast: true,
         ..Traits::NONE
     },

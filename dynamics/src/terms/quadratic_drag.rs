@@ -2,8 +2,8 @@
 
 use super::law::joint_law;
 use super::{
-    Against, Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated,
-    Traits, Words,
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
+    Words,
 };
 
 /// Effort c qd |qd|.
@@ -35,7 +35,6 @@ pub(super) static EFFECT: Effect = Effect {
         })
     }),
     traits: Traits {
-        drawn_over: Some(Against::Velocity),
         smallest_told_as: Some("drag_nms2_per_rad2"),
         ..Traits::NONE
     },

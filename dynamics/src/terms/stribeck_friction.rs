@@ -2,8 +2,8 @@
 
 use super::law::joint_law;
 use super::{
-    Against, Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Scale,
-    Simpler, Simulated, Traits, Words, sign,
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Scale, Simpler,
+    Simulated, Traits, Words, sign,
 };
 
 /// Friction that falls with speed keeps at least this share of what it is when a joint breaks away: none falls to nothing.
@@ -57,7 +57,6 @@ pub(super) static EFFECT: Effect = Effect {
         })
     }),
     traits: Traits {
-        drawn_over: Some(Against::Velocity),
         is_fast: true,
         ..Traits::NONE
     },

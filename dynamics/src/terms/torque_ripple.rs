@@ -4,19 +4,9 @@ use std::f64::consts::PI;
 
 use super::law::joint_law;
 use super::{
-    Against, Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Scale,
-    Simulated, Traits, Words,
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Scale, Simulated,
+    Traits, Words,
 };
-
-/// What is behind a gear comes back after a revolution: slower waves are whole numbers of cycles in it, within what is
-/// known of them.
-/// Tuned: not swept.
-const MOST_WHOLE_CYCLES: f64 = 30.0;
-/// How far from a whole number that is, at the most. Tuned: not swept.
-const NEARLY_WHOLE: f64 = 0.15;
-/// That of a wave of no cycle, and how much more for each cycle: slow waves are known better.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const NEARLY_WHOLE_PER_CYCLE: [f64; 2] = [0.03, 0.02];
 
 /// Effort -A sin(n q + φ), searched as the factors of sin n q and cos n q. Of several waves each is a term.
 pub(super) static EFFECT: Effect = Effect {
@@ -66,14 +56,8 @@ pub(super) static EFFECT: Effect = Effect {
         })
     }),
     traits: Traits {
-        drawn_over: Some(Against::Position),
         most_at_one_place: 2,
         second: &["amplitude2_nm", "cycles_per_rev2", "phase2_rad"],
-        is_made_by_gears: |x| {
-            let [at_none, more] = NEARLY_WHOLE_PER_CYCLE;
-            let nearly = (at_none + more * x[2]).min(NEARLY_WHOLE);
-            x[2] >= MOST_WHOLE_CYCLES || (x[2] - x[2].round()).abs() <= nearly
-        },
         ..Traits::NONE
     },
     build: |site, values| {

@@ -3,8 +3,8 @@
 use super::law::joint_law;
 use super::payload_pickup::time;
 use super::{
-    Against, Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, Parameter, PlaceKind,
-    Simpler, Simulated, Traits, Words,
+    Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simpler,
+    Simulated, Traits, Words,
 };
 
 /// A smaller change, as a share of the larger value, is what friction does from day to day.
@@ -52,7 +52,6 @@ pub(super) static EFFECT: Effect = Effect {
     concealed: None,
     traits: Traits {
         is_off_list: true,
-        drawn_over: Some(Against::Velocity),
         ..Traits::NONE
     },
     build: |site, values| {

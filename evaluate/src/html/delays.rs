@@ -1,7 +1,7 @@
 //! How long after the beginning of a contact the alarm comes.
 
 use maud::{Markup, html};
-use tauscope_explain::html::chart::{Axis, Panel, r};
+use tauscope_report::chart::{Axis, Panel, r};
 
 use super::line_class;
 use crate::judged::Judged;

@@ -1,7 +1,7 @@
 //! Receiver operating characteristics.
 
 use maud::{Markup, html};
-use tauscope_explain::html::chart::{Axis, Panel};
+use tauscope_report::chart::{Axis, Panel};
 
 use super::line_class;
 use crate::judged::Judged;

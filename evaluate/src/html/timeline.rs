@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 use tauscope_dynamics::terms::words::counted;
-use tauscope_explain::html::chart::{Axis, Panel, bulk, r};
+use tauscope_report::chart::{Axis, Panel, bulk, r};
 
 use super::recommendation;
 use crate::judged::Judged;

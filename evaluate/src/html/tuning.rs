@@ -3,7 +3,7 @@
 
 use maud::{Markup, html};
 use tauscope_detect::frame::{FoundSweep, Sweeps, ThresholdSweep};
-use tauscope_explain::html::chart::{Axis, Panel, r};
+use tauscope_report::chart::{Axis, Panel, r};
 
 use crate::judged::Judged;
 

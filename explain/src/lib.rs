@@ -1,0 +1,24 @@
+#![doc = include_str!("../README.md")]
+
+mod context;
+mod data;
+mod explain;
+mod fit;
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod fixture;
+mod inference;
+mod measure;
+mod outcome;
+mod parallel;
+mod physics;
+mod propose;
+mod read;
+pub mod report;
+
+pub use explain::explain;
+pub use measure::{Measured, Number, measure};
+pub use outcome::Outcome;
+pub use read::input::Input;
+pub use read::recording::{Losses, Recording, RecordingTopics};
+pub use read::start::Start;
