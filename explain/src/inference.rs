@@ -90,6 +90,7 @@ pub fn infer(
         say,
     );
     let mut round = 0;
+    let mut visited: Vec<(Vec<Hypothesis>, f64)> = Vec::new();
     loop {
         round += 1;
         say("comparing explanations");
@@ -99,15 +100,20 @@ pub fn infer(
         let measured = variants::measured(problem, &fit);
         state.estimate_noise(&fit, &nuisances, &given, &measured, false);
         let space = state.space(&nuisances);
-        let (objective, taken, is_partial) = searched(problem, &state, &space, &fit, given);
+        let (objective, mut taken, is_partial) = searched(problem, &state, &space, &fit, given);
         let own: Set = (0..fit.actives.len()).collect();
-        let gained = objective.score(&taken.set) - objective.score(&own);
+        let mut gained = objective.score(&taken.set) - objective.score(&own);
+        visited.push((effects(&fit), gained));
+        if returns(&visited, &effects(&taken.solution.fit)) {
+            let here = (&objective, &measured);
+            taken = step(problem, &state, &space, here, &own).taken(&own, &own);
+            gained = 0.0;
+        }
         let is_partial = is_partial || taken.is_shortened && gained > 0.0;
         let is_settled = round > 1 && !is_partial && gained < AS_LIKELY;
         let solution = taken.solution;
         if is_settled || round == ROUNDS {
-            let actives = solution.fit.actives.iter();
-            let effects: Vec<Hypothesis> = actives.map(|a| a.hypothesis).collect();
+            let effects = effects(&solution.fit);
             let (margins, alternatives) = margins(&objective, &taken.set, &effects);
             return Inferred {
                 covariance: solution.covariance,
@@ -122,6 +128,23 @@ pub fn infer(
         fit = solution.fit;
         follow(problem, &mut state, &space, &fit, &sizes, &nuisances);
     }
+}
+
+/// The effects of a fit, without their numbers.
+fn effects(fit: &Fit) -> Vec<Hypothesis> {
+    fit.actives.iter().map(|active| active.hypothesis).collect()
+}
+
+/// Whether a search leads back to an explanation that it was at before, and the last one visited is that of the circle which
+/// it left for the least gain. The noise is estimated anew beside each explanation, so two can each seem better from the
+/// other.
+fn returns(visited: &[(Vec<Hypothesis>, f64)], next: &Vec<Hypothesis>) -> bool {
+    let Some((last, gained)) = visited.last().filter(|(last, _)| last != next) else {
+        return false;
+    };
+    let circle = visited.iter().skip_while(|(effects, _)| effects != next);
+    let mut gains = circle.filter(|(effects, _)| effects != last).peekable();
+    gains.peek().is_some() && gains.all(|(_, other)| gained <= other)
 }
 
 /// The first explanation, next to bodies that are as the URDF says and next to bodies with usual errors: the more probable of
@@ -140,15 +163,12 @@ fn begun(
     let given = variants::all(problem, &fit, hypotheses, &state.efforts);
     state.estimate_noise(&fit, &nuisances, &given, &measured, true);
     state.estimate_tempers(&fit, &nuisances, &linear_columns(&given), &measured);
-    let mut given = Some(given);
     let starts: &[f64] = if state.bodies { &STARTS } else { &STARTS[..1] };
     let tried = starts.iter().map(|&scale| {
         state.scales[0] = scale;
         let nuisances = nuisance::of(problem, &fit, &sizes, state.bodies, state.scales);
         let space = state.space(&nuisances);
-        let given = (given.take())
-            .unwrap_or_else(|| variants::all(problem, &fit, hypotheses, &state.efforts));
-        let (_, taken, _) = searched(problem, state, &space, &fit, given);
+        let (_, taken, _) = searched(problem, state, &space, &fit, given.clone());
         let value = taken.value - disfavour(state.scales);
         (value, scale, taken.solution.fit, space, nuisances)
     });
@@ -178,16 +198,26 @@ fn searched<'s>(
     let found = search::search(&objective, own.clone());
     let (found, is_partial) = first_that_bends(&objective, &own, found);
     let found = nested::simplest(&objective, found);
-    let here = space.evidence(&measured) + objective.score(&own);
-    let step = Step {
+    let here = (&objective, &measured);
+    let taken = step(problem, state, space, here, &own).taken(&own, &found);
+    (objective, taken, is_partial)
+}
+
+/// A step that begins at the set `own` of an objective.
+fn step<'a>(
+    problem: &'a Problem,
+    state: &'a State<'_>,
+    space: &'a Space,
+    (objective, measured): (&'a Objective<'_>, &Column),
+    own: &Set,
+) -> Step<'a> {
+    Step {
         problem,
         space,
         state,
-        objective: &objective,
-        here,
-    };
-    let taken = step.taken(&own, &found);
-    (objective, taken, is_partial)
+        objective,
+        here: space.evidence(measured) + objective.score(own),
+    }
 }
 
 /// Estimates what accompanies an explanation anew.
@@ -216,8 +246,7 @@ pub fn around(problem: &Problem, hypotheses: &[Hypothesis], fit: Fit, bodies: bo
     let space = state.space(&nuisances);
     let objective = Objective::new(&space, &measured, given);
     let own: Set = (0..fit.actives.len()).collect();
-    let effects: Vec<Hypothesis> = fit.actives.iter().map(|a| a.hypothesis).collect();
-    let (margins, alternatives) = margins(&objective, &own, &effects);
+    let (margins, alternatives) = margins(&objective, &own, &effects(&fit));
     let deviations: Vec<f64> = (objective.variants[..own.len()].iter())
         .flat_map(Variant::all_deviations)
         .collect();

@@ -1,11 +1,12 @@
 //! An explanation with its numbers: the effort that it computes for the recordings, and the residual.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::data::column::{Column, Columns};
 use crate::data::efforts::{Efforts, TrackEfforts};
 use crate::data::problem::Problem;
 use crate::fit::least_squares::Products;
+use crate::parallel;
 use crate::physics::active::{Active, Hypothesis};
 use crate::physics::columns::columns;
 use crate::physics::efforts::change;
@@ -30,6 +31,8 @@ pub struct Fit {
     pub squares: Vec<f64>,
     /// Number of compared rows, by joint.
     pub count: Vec<f64>,
+    /// Effort of each effect beside the others, computed when it is asked for.
+    own: OnceLock<Vec<Column>>,
 }
 
 impl Fit {
@@ -49,6 +52,7 @@ impl Fit {
             variance: Vec::new(),
             squares: Vec::new(),
             count: Vec::new(),
+            own: OnceLock::new(),
         };
         let mut residual = problem.measured.clone();
         for joint in 0..problem.joints {
@@ -114,6 +118,20 @@ impl Fit {
         let joint = joint.filter(|&joint| !self.parts.feeds(joint));
         let changed = change(problem, &self.actives, self.efforts(problem), active, on);
         problem.column(&changed, joint)
+    }
+
+    /// The effort of each effect beside the others: what is left without it, less what is left with it.
+    pub fn own_efforts(&self, problem: &Problem) -> &[Column] {
+        let all: Vec<usize> = (0..self.actives.len()).collect();
+        let of = |&index: &usize| {
+            let less = self.without(problem, index);
+            let joint = self.actives[index].hypothesis.only_joint();
+            let rows = joint.map_or(0..problem.joints * problem.rows, |j| problem.joint_rows(j));
+            let pairs = less.residual[rows.clone()].iter().zip(&self.residual[rows]);
+            let values = pairs.map(|(less, with)| less - with).collect();
+            Column { joint, values }
+        };
+        self.own.get_or_init(|| parallel::map(&all, of))
     }
 
     /// The fit without one of its effects, not refined.

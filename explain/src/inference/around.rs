@@ -57,34 +57,36 @@ impl<'a> Around<'a> {
 
     fn beside(&self, variant: usize) -> &Beside {
         self.beside[variant].get_or_init(|| {
-            let objective = self.objective;
-            let columns = objective.variants[variant].with_offset();
-            let m = columns.len();
-            let rows = |of: &[usize]| of.iter().map(|&i| objective.gram(i)).collect::<Vec<_>>();
-            let (own, offsets) = (rows(&self.base.index), rows(&self.base.offsets));
-            let cross = DMatrix::from_fn(own.len(), m, |a, c| own[a][columns.start + c]);
-            let right = DVector::from_fn(m, |c, _| {
-                let at = columns.start + c;
-                objective.columns[at].right - offsets.iter().map(|row| row[at]).sum::<f64>()
-            });
-            self.of_products(&cross, &objective.own[variant], &right)
+            let mut own = self.besides(&[variant]);
+            own.swap_remove(0)
         })
     }
 
-    /// Products of residual columns, from the products `cross` of the columns with the set's columns, `own` with each other,
-    /// and `right` with the measurement less the set's offsets.
-    fn of_products(
-        &self,
-        cross: &DMatrix<f64>,
-        own: &DMatrix<f64>,
-        right: &DVector<f64>,
-    ) -> Beside {
-        let shares = &self.inverse * cross;
-        Beside {
-            own: own - cross.tr_mul(&shares),
-            right: right - cross.tr_mul(&self.mean),
-            shares,
-        }
+    /// Residual columns of some variants, solved for together.
+    fn besides(&self, variants: &[usize]) -> Vec<Beside> {
+        let objective = self.objective;
+        let of = |&v: &usize| objective.variants[v].with_offset();
+        let columns: Vec<usize> = variants.iter().flat_map(of).collect();
+        let rows = |of: &[usize]| of.iter().map(|&i| objective.gram(i)).collect::<Vec<_>>();
+        let (own, offsets) = (rows(&self.base.index), rows(&self.base.offsets));
+        let cross = DMatrix::from_fn(own.len(), columns.len(), |a, c| own[a][columns[c]]);
+        let shares = &self.inverse * &cross;
+        let mut first = 0;
+        let one = |v: &usize| {
+            let m = of(v).len();
+            let (cross, shares) = (cross.columns(first, m), shares.columns(first, m));
+            let right = DVector::from_fn(m, |c, _| {
+                let at = columns[first + c];
+                objective.columns[at].right - offsets.iter().map(|row| row[at]).sum::<f64>()
+            });
+            first += m;
+            Beside {
+                own: &objective.own[*v] - cross.tr_mul(&shares),
+                right: right - cross.tr_mul(&self.mean),
+                shares: shares.into_owned(),
+            }
+        };
+        variants.iter().map(one).collect()
     }
 
     /// Products of the residual columns of further columns: with each other, and with the residual of the measurement.
@@ -101,8 +103,33 @@ impl<'a> Around<'a> {
             let offsets = self.base.offsets.iter();
             columns[c].right - offsets.map(|&o| product(&columns[c], o)).sum::<f64>()
         });
-        let beside = self.of_products(&cross, &own, &right);
-        (beside.own, beside.right)
+        let shares = &self.inverse * &cross;
+        (
+            own - cross.tr_mul(&shares),
+            right - cross.tr_mul(&self.mean),
+        )
+    }
+
+    /// Loss in value without one of the set's variants \[nats\], from the products that its columns have beside the others:
+    /// the block of the inverse is the inverse of those. Nothing where a shape or a bound makes it more than that.
+    pub fn loss(&self, variant: usize) -> Option<f64> {
+        let objective = self.objective;
+        let own = &objective.variants[variant];
+        let index = self.base.index.iter().enumerate();
+        let rows: Vec<usize> = index
+            .filter(|(_, column)| own.columns().contains(column))
+            .map(|(a, _)| a)
+            .collect();
+        if own.offset.is_some() || rows.len() < own.deviations.len() {
+            return None;
+        }
+        let block = self.inverse.select_rows(&rows).select_columns(&rows);
+        let mut products = block.cholesky()?.inverse();
+        let right = &products * self.mean.select_rows(&rows);
+        for k in 0..rows.len() {
+            products[(k, k)] -= 1.0;
+        }
+        Some(objective.gain(own, &objective.own[variant], &products, &right))
     }
 
     /// The smallest first factor with which a variant would join the set, measured as it is: by bisection.
@@ -169,6 +196,11 @@ impl<'a> Around<'a> {
             rows.iter().map(|&a| self.mean[a] + returned_shares[a]),
         );
         let mean = block.solve(&mean);
+        let is_new = |v: &usize| self.beside[*v].get().is_none() && objective.fits(&less, *v);
+        let new: Vec<usize> = variants.iter().copied().filter(is_new).collect();
+        for (v, beside) in new.iter().zip(self.besides(&new)) {
+            self.beside[*v].get_or_init(|| beside);
+        }
         let one = |&v: &usize| {
             if !objective.fits(&less, v) {
                 return (v, f64::NEG_INFINITY);

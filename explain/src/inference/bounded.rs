@@ -98,10 +98,7 @@ impl Bounded {
 
     /// The same of the free ones.
     pub fn of_free(&self) -> (DVector<f64>, DMatrix<f64>) {
-        let p = self.free.len();
-        let mut inverse = DMatrix::identity(p, p);
-        self.lower.solve_lower_triangular_mut(&mut inverse);
-        let inverse = inverse.transpose();
+        let inverse = inverse_of_lower(&self.lower).transpose();
         (&inverse * &self.solved, inverse)
     }
 
@@ -119,6 +116,25 @@ impl Bounded {
             + shares.sum::<f64>()
             + self.of_held
     }
+}
+
+/// Inverse of a lower triangular matrix. Its columns begin at the diagonal, which a general solver does not know.
+fn inverse_of_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
+    let p = lower.nrows();
+    let mut inverse = DMatrix::zeros(p, p);
+    for j in 0..p {
+        let mut column = inverse.column_mut(j);
+        column[j] = 1.0;
+        for k in j..p {
+            let x = column[k] / lower[(k, k)];
+            column[k] = x;
+            let below = p - k - 1;
+            column
+                .rows_mut(k + 1, below)
+                .axpy(-x, &lower.column(k).rows(k + 1, below), 1.0);
+        }
+    }
+    inverse
 }
 
 #[cfg(test)]
@@ -148,6 +164,19 @@ mod tests {
         }
         // Two half-normal priors, whose squares the matrix has.
         (sum * step * step * 4.0 / std::f64::consts::TAU).ln()
+    }
+
+    #[test]
+    fn a_triangular_matrix_times_its_inverse_is_one() {
+        let lower = DMatrix::from_fn(5, 5, |i, j| {
+            if i < j {
+                0.0
+            } else {
+                1.0 + (i * 3 + j) as f64 % 4.0
+            }
+        });
+        let one = &lower * inverse_of_lower(&lower);
+        assert!((one - DMatrix::identity(5, 5)).amax() < 1e-12);
     }
 
     #[test]

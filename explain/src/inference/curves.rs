@@ -23,7 +23,7 @@ const LENGTH_SHARE: f64 = 0.25;
 const ROUGH_SHARE: f64 = 0.1;
 
 /// A curve with the prior of its values.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Curve {
     /// The effect that it is.
     pub hypothesis: Hypothesis,

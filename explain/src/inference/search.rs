@@ -18,6 +18,8 @@ const ADDED: usize = 6;
 const REPLACED: usize = 3;
 /// Best floods that are followed. Resolution: changes the computing time.
 const FLOODS: usize = 3;
+/// Effects of the smallest first-order loss that are left out in trial. Resolution: changes the computing time.
+const IDLEST: usize = 3;
 /// Most steps. Resolution: bounds the computing time; a step that gains nothing is the last.
 const STEPS: usize = 30;
 /// A step that gains less is the last \[nats\]. Resolution: of the objective's rounding.
@@ -196,14 +198,23 @@ fn warm(objective: &Objective<'_>, start: Set, allowed: &[usize]) -> Set {
 /// The set without the effects that it is no worse without, the idlest first.
 pub fn without_idle(objective: &Objective<'_>, mut best: Set) -> Set {
     loop {
-        let free = best
-            .iter()
-            .copied()
-            .filter(|&v| !objective.variants[v].is_forced);
-        let less = free.map(|v| without(&best, v));
+        let Some(around) = Around::new(objective, &best) else {
+            return best;
+        };
+        let own = objective.score(&best);
+        let free = best.iter().filter(|&&v| !objective.variants[v].is_forced);
+        let mut losses: Vec<(f64, usize)> = free
+            .map(|&v| {
+                let exact = || own - objective.score(&without(&best, v));
+                (around.loss(v).unwrap_or_else(exact), v)
+            })
+            .collect();
+        losses.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let idlest = losses.iter().take(IDLEST);
+        let less = idlest.map(|(_, v)| without(&best, *v));
         let less = less.max_by(|a, b| objective.score(a).total_cmp(&objective.score(b)));
         match less {
-            Some(less) if objective.score(&less) >= objective.score(&best) => best = less,
+            Some(less) if objective.score(&less) >= own => best = less,
             _ => return best,
         }
     }

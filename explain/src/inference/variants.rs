@@ -22,7 +22,7 @@ const SILENT: f64 = 1e-9;
 const TIMES: f64 = 60.0;
 
 /// A hypothesis at one shape.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Variant {
     /// The effect and its place.
     pub hypothesis: Hypothesis,
@@ -118,6 +118,7 @@ impl Variant {
 }
 
 /// The columns of a variant, unwhitened.
+#[derive(Debug, Clone)]
 pub struct Given {
     /// The variant; `offset` and `first` are filled in.
     pub variant: Variant,
@@ -198,6 +199,7 @@ fn of_curves(problem: &Problem, fit: &Fit, joint: usize, sizes: &[Magnitude]) ->
 /// The effects of a fit as they are, one each, in their order.
 pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[Magnitude]) -> Vec<Given> {
     let jacobian = fit.jacobian(problem);
+    let own_efforts = fit.own_efforts(problem);
     let free = fit.parameters();
     let of = |(i, active): (usize, &Active)| {
         let own = free.iter().zip(&jacobian);
@@ -210,7 +212,7 @@ pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[Magnitude]) -> Vec<Given> {
             .collect();
         // The intercept of the tangent: the effect's effort less that of its factors.
         let joint = active.hypothesis.only_joint();
-        let mut alone = total(problem, fit, i, joint);
+        let mut alone = own_efforts[i].clone();
         for (factor, column) in &factors {
             for (k, value) in alone.values.iter_mut().enumerate() {
                 let of = match (joint, column.joint) {
@@ -250,25 +252,13 @@ pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[Magnitude]) -> Vec<Given> {
     fit.actives.iter().enumerate().map(of).collect()
 }
 
-/// Effort of one effect of a fit.
-fn total(problem: &Problem, fit: &Fit, index: usize, joint: Option<usize>) -> Column {
-    let less = fit.without(problem, index);
-    let rows = joint.map_or(0..problem.joints * problem.rows, |j| problem.joint_rows(j));
-    let pairs = less.residual[rows.clone()].iter().zip(&fit.residual[rows]);
-    Column {
-        joint,
-        values: pairs.map(|(less, with)| less - with).collect(),
-    }
-}
-
 /// The measured effort, less what the twin without the effects of `fit` explains, as far as that is the sum of the
 /// effects' own efforts.
 pub fn measured(problem: &Problem, fit: &Fit) -> Column {
     let mut values = fit.residual.clone();
-    for (i, active) in fit.actives.iter().enumerate() {
-        let total = total(problem, fit, i, active.hypothesis.only_joint());
-        let first = total.joint.map_or(0, |joint| joint * problem.rows);
-        for (value, add) in values[first..].iter_mut().zip(&total.values) {
+    for own in fit.own_efforts(problem) {
+        let first = own.joint.map_or(0, |joint| joint * problem.rows);
+        for (value, add) in values[first..].iter_mut().zip(&own.values) {
             *value += add;
         }
     }
