@@ -5,6 +5,7 @@
 
 use tauscope_dynamics::{
     Data, Follower, Geometry, JointKind, Limits, Model, fix_joints, forward_kinematics, link_pose,
+    mass_matrix,
 };
 
 const INERTIAL: &str = "<inertial><origin xyz='0 0 0.1'/><mass value='2'/>\
@@ -328,6 +329,12 @@ fn masses_must_be_there_and_not_below_zero() {
         refusal(&with("")),
         "line 5: joint `left_arm` moves no mass: links `left`, `hand` are without a mass in <inertial>"
     );
+    // The virtual joint of a gripper has no mass of its own, and fingers that follow it.
+    let limit = "<limit velocity=\"2\" effort=\"10\"/>";
+    let gripper = with("").replace(limit, "<mimic joint=\"left_arm\"/>");
+    let model = Model::from_urdf(&gripper).unwrap();
+    let mass = mass_matrix(&model, &mut Data::new(&model), &vec![0.3; model.dof()]).clone();
+    assert!(mass.diagonal().min() > 0.0, "{mass}");
     assert_eq!(
         refusal(&with(&INERTIAL.replace("'2'", "'-2'"))),
         "line 30: the mass of link `hand` is -2 kg"

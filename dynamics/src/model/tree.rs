@@ -233,6 +233,12 @@ fn refuse_massless(
         // What follows a joint may be without a mass: that joint moves others.
         .filter(|body| body.own.mass == 0.0 && body.block == body.joint)
         .map(|body| body.joint)
+        // A joint without a mass of its own may move others: the virtual joint of a gripper, which its fingers follow.
+        .filter(|joint| {
+            bodies
+                .iter()
+                .all(|body| body.joint != *joint || body.own.mass == 0.0)
+        })
         .collect();
     massless.sort_unstable();
     let Some(&joint) = massless.first() else {

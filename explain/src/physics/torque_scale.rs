@@ -1,8 +1,8 @@
 //! The scale between N m and a recorded current, where the torque constants are not known.
 
 use tauscope_dynamics::terms::{
-    Coordinate, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind, Simulated,
-    Term, Traits, Words,
+    Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, MotionSample, Parameter,
+    PlaceKind, Simulated, Term, Traits, Words,
 };
 
 use crate::physics::active::{Active, Hypothesis, TORQUE_SCALE, Whereabouts};
@@ -22,8 +22,15 @@ pub static EFFECT: Effect = Effect {
     place: PlaceKind::Joint,
     layer: Layer::Body,
     odds_nats: 0.0,
-    parameters: &[Parameter::ratio("gain", f64::NEG_INFINITY)],
-    coordinates: &[Coordinate::factor("gain_minus_one")],
+    parameters: &[Parameter::ratio("gain", 0.0)],
+    // A motor's torque has the sign of its current; a driver that turns it is a fault of the recording.
+    coordinates: &[Coordinate {
+        name: "gain_minus_one",
+        kind: CoordinateKind::Factor {
+            step: 1.0,
+            minimum: -1.0,
+        },
+    }],
     to_parameters: |c| vec![1.0 + c[0]],
     to_coordinates: |p| vec![p[0] - 1.0],
     simpler: None,
