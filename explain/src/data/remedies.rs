@@ -286,6 +286,11 @@ pub fn is_one_body(problem: &Problem) -> bool {
     Trial::new(problem, true).is_one_body()
 }
 
+/// The direction of gravity in the base by which a robot would fit these efforts best, if it is not that of its model.
+pub fn turned_gravity(problem: &Problem) -> Option<[f64; 3]> {
+    Trial::new(problem, true).turned_gravity().map(Into::into)
+}
+
 /// All remedies that can be tried on a reading.
 fn candidates(n: usize, turns: &[bool], reading: &Reading) -> Vec<Remedy> {
     let mut all = Vec::new();

@@ -90,7 +90,13 @@ impl Context<'_> {
         if input.start.is_some() {
             return Ok(None);
         }
-        if let Some(reason) = likeness.of_another_robot() {
+        if let Some(mut reason) = likeness.of_another_robot() {
+            if let Some([x, y, z]) = remedies::turned_gravity(problem) {
+                reason += &format!(
+                    ", or its base is mounted otherwise: the efforts are nearest to those of gravity along ({x:.2}, {y:.2}, \
+                     {z:.2}) in the base. Turn the first joint's <origin rpy> by that and try again"
+                );
+            }
             return Err(Stop::Reason(reason));
         }
         match scale {

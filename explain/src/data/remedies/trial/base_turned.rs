@@ -16,7 +16,24 @@ const TURNED_RAD: f64 = 0.5;
 impl Trial<'_> {
     /// Roll and pitch of the base that fit best, if gravity is then as strong as before.
     pub(super) fn base_turned(&self) -> Option<(Remedy, Vec<f64>)> {
-        let model = &self.problem.model;
+        let (found, model_turned) = self.gravity()?;
+        let was = Vector3::from(self.problem.model.gravity());
+        let same = (found.norm() / was.norm() - 1.0).abs() < SAME_GRAVITY;
+        let upright = was.x == 0.0 && was.y == 0.0;
+        let turned = found.angle(&was) > TURNED_RAD;
+        let remedy = Remedy::BaseTurned(turn_to(&found));
+        (same && upright && turned).then_some((remedy, model_turned))
+    }
+
+    /// The direction of gravity in the base that fits best, if it is not that of the model.
+    pub fn turned_gravity(&self) -> Option<Vector3<f64>> {
+        let (found, _) = self.gravity()?;
+        let was = Vector3::from(self.problem.model.gravity());
+        (found.angle(&was) > TURNED_RAD).then(|| found.normalize())
+    }
+
+    /// Gravity in the base that fits best \[m/s²\], and the twin's effort under it.
+    fn gravity(&self) -> Option<(Vector3<f64>, Vec<f64>)> {
         let along = |axis: usize| {
             let mut gravity = [0.0; 3];
             gravity[axis] = 1.0;
@@ -26,18 +43,12 @@ impl Trial<'_> {
         let mut weightless = self.problem.rigid().to_vec();
         for (weightless, weight) in weightless
             .iter_mut()
-            .zip(self.against_gravity(model.gravity()))
+            .zip(self.against_gravity(self.problem.model.gravity()))
         {
             *weightless -= weight;
         }
-        let (found, model_turned) = self.fitted(&weightless, &columns)?;
-        let found = Vector3::new(found[0], found[1], found[2]);
-        let was = Vector3::from(model.gravity());
-        let same = (found.norm() / was.norm() - 1.0).abs() < SAME_GRAVITY;
-        let upright = was.x == 0.0 && was.y == 0.0;
-        let turned = found.angle(&was) > TURNED_RAD;
-        let remedy = Remedy::BaseTurned(turn_to(&found));
-        (same && upright && turned).then_some((remedy, model_turned))
+        let (found, effort) = self.fitted(&weightless, &columns)?;
+        Some((Vector3::new(found[0], found[1], found[2]), effort))
     }
 
     fn against_gravity(&self, gravity: [f64; 3]) -> Vec<f64> {
