@@ -5,7 +5,7 @@ use tauscope_dynamics::terms::{TermError, TermSpec};
 use crate::data::other_simulation::leave_out_other_states;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
-use crate::physics::active::Hypothesis;
+use crate::physics::active::{Hypothesis, TimeKind};
 use crate::physics::library;
 use crate::read::input::Input;
 use crate::read::recording::Recording;
@@ -38,6 +38,10 @@ impl Context<'_> {
         // The fit already has a free scale for such a joint.
         let unscaled = |joint: usize| self.unscaled.iter().any(|(other, _)| *other == joint);
         all.retain(|h| !h.effect.traits.is_scale || !unscaled(h.place.joint));
+        if input.fit.iter().any(Recording::is_of_poses) {
+            // The order of poses is no time.
+            all.retain(|h| h.time_kind() == TimeKind::Always && !h.is_of_timing());
+        }
         all
     }
 

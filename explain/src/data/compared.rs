@@ -20,6 +20,10 @@ const OPEN_SAMPLES: f64 = 4.0;
 impl Track {
     /// Beginning and end of each gap that leaves the motion below a cutoff open, with what is left out beside it \[s\].
     pub(crate) fn gaps(&self, cutoff_hz: f64) -> Vec<[f64; 2]> {
+        // Of poses no motion is needed.
+        if mean_step_s(&self.time_s) > MAX_GAP_S {
+            return Vec::new();
+        }
         let open = (OPEN_PERIODS / cutoff_hz).max(OPEN_SAMPLES * mean_step_s(&self.time_s));
         let pairs = self.time_s.windows(2);
         let beside = |pair: &[f64]| {

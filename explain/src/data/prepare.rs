@@ -20,6 +20,9 @@ const CUTOFF_HZ: f64 = 8.0;
 /// The cutoff is at most this share of the sample rate.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const CUTOFF_OF_RATE: f64 = 0.1;
+/// The same where the samples are poses, which no filter may mix. Derived: at half the rate, the highest frequency that
+/// they can have, the filter then passes all but 2^-12.
+const POSES_OF_RATE: f64 = 2.0;
 /// The cutoff of the motion's smoother over that of the comparison.
 /// Physical: a smoother with the response `1 / (1 + (f / fc)^6)` still passes 98 % at half its cutoff.
 const MOTION_CUTOFF_RATIO: f64 = 2.0;
@@ -43,9 +46,15 @@ const RESOLUTION: f64 = 1e-7;
 impl Problem {
     /// The frequency below which these recordings are compared \[Hz\].
     pub fn cutoff_hz(recordings: &[Recording]) -> f64 {
-        let rates = recordings.iter().map(Recording::rate_hz);
-        let slowest = rates.fold(f64::INFINITY, f64::min);
-        CUTOFF_HZ.min(CUTOFF_OF_RATE * slowest)
+        let of = |recording: &Recording| {
+            let share = if recording.is_of_poses() {
+                POSES_OF_RATE
+            } else {
+                CUTOFF_OF_RATE
+            };
+            share * recording.rate_hz()
+        };
+        recordings.iter().map(of).fold(CUTOFF_HZ, f64::min)
     }
 
     /// The half amplitude of the smoother of motion for a comparison below `cutoff_hz` \[Hz\].
@@ -91,7 +100,12 @@ impl Problem {
                 let mut signal: Vec<f64> = of_joint
                     .map(|at| (recording.effort[at] - full.beside[at]) * unit_nm[j])
                     .collect();
-                let (white, new) = of_effort(&signal);
+                // The effort of poses has no faster changes than its own: its noise is estimated beside an explanation alone.
+                let (white, new) = if recording.is_of_poses() {
+                    (0.0, 1.0)
+                } else {
+                    of_effort(&signal)
+                };
                 let rate = new * recording.rate_hz();
                 let share = (cutoff_hz * NOISE_BANDWIDTH / (0.5 * rate)).min(1.0);
                 variances[j].push((white * share, white));
@@ -192,7 +206,10 @@ fn acceleration_variance(recording: &Recording, joint: usize, n: usize, cutoff_h
 /// Standard deviation of the same, of the recording in the middle.
 fn acceleration_noise(recordings: &[Recording], joint: usize, n: usize, cutoff_hz: f64) -> f64 {
     let of = |recording| acceleration_variance(recording, joint, n, cutoff_hz);
-    let mut all: Vec<f64> = recordings.iter().map(of).collect();
+    let moving = recordings
+        .iter()
+        .filter(|recording| !recording.is_of_poses());
+    let mut all: Vec<f64> = moving.map(of).collect();
     all.sort_by(f64::total_cmp);
     all.get(all.len() / 2)
         .map_or(0.0, |variance| variance.sqrt())
@@ -205,6 +222,8 @@ fn deviation(variance: f64, largest_effort: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use tauscope_dynamics::{Data, gravity_effort};
+
     use crate::data::noise::MEDIAN_OF_ABS_NORMAL;
     use crate::fixture::{Noise, model, problem, recording};
 
@@ -231,5 +250,41 @@ mod tests {
         let deviation = seen[seen.len() / 2].abs() / MEDIAN_OF_ABS_NORMAL;
         let ratio = problem.acceleration_noise[1] / deviation;
         assert!((0.7..1.4).contains(&ratio), "{ratio}");
+    }
+
+    /// A log of one row a pose, whose time counts the rows: the effort of a pose is compared with the gravity at that pose.
+    #[test]
+    fn poses_are_compared_as_they_are() {
+        let model = model();
+        let mut held = recording(&model, 3, |_, _, _| {});
+        let mut data = Data::new(&model);
+        held.time_s = (0..held.len()).map(|k| k as f64).collect();
+        for (effort, position) in
+            (held.effort.chunks_exact_mut(2)).zip(held.position.chunks_exact(2))
+        {
+            effort.copy_from_slice(gravity_effort(&model, &mut data, position));
+            effort[1] += 0.4;
+        }
+        let problem = problem(&model, &[held]);
+        let left = |joint: usize| -> Vec<f64> {
+            let rows = problem.joint_rows(joint);
+            let pairs = problem.measured[rows.clone()]
+                .iter()
+                .zip(&problem.rigid()[rows.clone()]);
+            let counted = pairs
+                .zip(&problem.weight[rows])
+                .filter(|(_, weight)| **weight > 0.0);
+            counted
+                .map(|((measured, rigid), _)| measured - rigid)
+                .collect()
+        };
+        for (joint, offset) in [(0, 0.0), (1, 0.4)] {
+            let left = left(joint);
+            assert!(left.len() > 1900, "{}", left.len());
+            let worst = left
+                .iter()
+                .fold(0.0_f64, |most, x| most.max((x - offset).abs()));
+            assert!(worst < 0.05, "{joint}: {worst}");
+        }
     }
 }

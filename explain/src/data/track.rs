@@ -57,19 +57,20 @@ impl Track {
     ) -> Self {
         let n = model.dof();
         let count = recording.len();
-        let smoother = MotionSmoother::new(&recording.time_s, motion_cutoff_hz);
+        let of_poses = recording.is_of_poses();
         let mut track = Self {
             name: recording.name.clone(),
             session_s,
             time_s: recording.time_s.clone(),
-            position: vec![0.0; n * count],
+            position: recording.position.clone(),
             velocity: vec![0.0; n * count],
             acceleration: vec![0.0; n * count],
             rigid: vec![0.0; n * count],
             beside: vec![0.0; n * count],
             quiet_s: BEGINNING_S,
         };
-        for j in 0..n {
+        let smoother = MotionSmoother::new(&recording.time_s, motion_cutoff_hz);
+        for j in (0..n).filter(|_| !of_poses) {
             let measured: Vec<f64> = (0..count).map(|k| recording.position[k * n + j]).collect();
             let mut states = smoother.smooth(&measured);
             standstill::resmooth(&recording.time_s, &measured, &mut states);
@@ -103,6 +104,9 @@ impl Track {
     /// Replaces the velocity: by that of positions smoothed with another cutoff \[Hz\] or, without one, by the recorded
     /// velocity. Standstills are smoothed by themselves. The twin's effort stays as it is.
     pub(crate) fn sharpen_velocity(&mut self, recording: &Recording, cutoff_hz: Option<f64>) {
+        if recording.is_of_poses() {
+            return;
+        }
         let n = self.velocity.len() / self.len().max(1);
         let smoother = cutoff_hz.map(|hz| MotionSmoother::new(&recording.time_s, hz));
         for j in 0..n {

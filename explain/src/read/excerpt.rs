@@ -24,7 +24,7 @@ pub fn excerpts(recordings: &mut [Recording]) -> Option<Excerpts> {
     let length_s =
         |recordings: &[Recording]| recordings.iter().map(Recording::duration_s).sum::<f64>();
     let whole_s = length_s(recordings);
-    if whole_s <= LONGEST_S {
+    if whole_s <= LONGEST_S || recordings.iter().any(Recording::is_of_poses) {
         return None;
     }
     // One of so many stretches of an excerpt's length is kept.

@@ -5,6 +5,7 @@ use crate::fit::fitted::Fit;
 use crate::read::audit::losses;
 use crate::read::excerpt::Excerpts;
 use crate::read::input::Input;
+use crate::read::recording::Recording;
 use crate::report::holdout::Proof;
 use crate::report::schema::Remaining;
 use crate::report::sentences::{UNCHANGED, unit_at};
@@ -95,7 +96,15 @@ pub fn notes(
             ));
         }
     }
-    if !at_rest {
+    let of_poses = input.fit.iter().any(Recording::is_of_poses);
+    if of_poses {
+        notes.push(
+            "The samples are too far apart to tell a motion, so they were compared as poses that the arm holds. That shows gravity, \
+             loads, springs, offsets and gains. It shows no friction, rotor, elasticity or delay: record motions for these."
+                .to_owned(),
+        );
+    }
+    if !at_rest && !of_poses {
         notes.push(
             "While a joint stands still, its friction can have any value up to the breakaway torque. Such rows were not used for \
              the fit; they do count in the error on the held-out recordings."

@@ -24,6 +24,11 @@ impl Recording {
     pub fn rate_hz(&self) -> f64 {
         1.0 / mean_step_s(&self.time_s).max(1e-6)
     }
+
+    /// Whether its samples are poses that were held: each is a gap from the next, and nothing is known of the motion between.
+    pub fn is_of_poses(&self) -> bool {
+        mean_step_s(&self.time_s) > MAX_GAP_S
+    }
 }
 
 #[cfg(test)]
