@@ -29,6 +29,7 @@ mod state;
 mod step;
 mod temper;
 mod variants;
+mod visited;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -47,6 +48,7 @@ use space::Space;
 use state::{State, disfavour};
 use step::{Step, Taken};
 use variants::{Given, Variant};
+use visited::Visited;
 
 /// Most rounds of linearising, estimating the noise and searching. Resolution: bounds the computing time.
 const ROUNDS: usize = 9;
@@ -90,7 +92,7 @@ pub fn infer(
         say,
     );
     let mut round = 0;
-    let mut visited: Vec<(Vec<Hypothesis>, f64)> = Vec::new();
+    let mut visited = Visited::default();
     loop {
         round += 1;
         say("comparing explanations");
@@ -103,8 +105,8 @@ pub fn infer(
         let (objective, mut taken, is_partial) = searched(problem, &state, &space, &fit, given);
         let own: Set = (0..fit.actives.len()).collect();
         let mut gained = objective.score(&taken.set) - objective.score(&own);
-        visited.push((effects(&fit), gained));
-        if returns(&visited, &effects(&taken.solution.fit)) {
+        visited.add(effects(&fit), gained);
+        if visited.ends_with_least_gain(&effects(&taken.solution.fit)) {
             let here = (&objective, &measured);
             taken = step(problem, &state, &space, here, &own).taken(&own, &own);
             gained = 0.0;
@@ -113,8 +115,8 @@ pub fn infer(
         let is_settled = round > 1 && !is_partial && gained < AS_LIKELY;
         let solution = taken.solution;
         if is_settled || round == ROUNDS {
-            let effects = effects(&solution.fit);
-            let (margins, alternatives) = margins(&objective, &taken.set, &effects);
+            let all = effects(&solution.fit);
+            let (margins, alternatives) = margins(&objective, &taken.set, &all);
             return Inferred {
                 covariance: solution.covariance,
                 margins,
@@ -133,18 +135,6 @@ pub fn infer(
 /// The effects of a fit, without their numbers.
 fn effects(fit: &Fit) -> Vec<Hypothesis> {
     fit.actives.iter().map(|active| active.hypothesis).collect()
-}
-
-/// Whether a search leads back to an explanation that it was at before, and the last one visited is that of the circle which
-/// it left for the least gain. The noise is estimated anew beside each explanation, so two can each seem better from the
-/// other.
-fn returns(visited: &[(Vec<Hypothesis>, f64)], next: &Vec<Hypothesis>) -> bool {
-    let Some((last, gained)) = visited.last().filter(|(last, _)| last != next) else {
-        return false;
-    };
-    let circle = visited.iter().skip_while(|(effects, _)| effects != next);
-    let mut gains = circle.filter(|(effects, _)| effects != last).peekable();
-    gains.peek().is_some() && gains.all(|(_, other)| gained <= other)
 }
 
 /// The first explanation, next to bodies that are as the URDF says and next to bodies with usual errors: the more probable of
@@ -247,9 +237,8 @@ pub fn around(problem: &Problem, hypotheses: &[Hypothesis], fit: Fit, bodies: bo
     let objective = Objective::new(&space, &measured, given);
     let own: Set = (0..fit.actives.len()).collect();
     let (margins, alternatives) = margins(&objective, &own, &effects(&fit));
-    let deviations: Vec<f64> = (objective.variants[..own.len()].iter())
-        .flat_map(Variant::all_deviations)
-        .collect();
+    let variants = objective.variants[..own.len()].iter();
+    let deviations: Vec<f64> = variants.flat_map(Variant::all_deviations).collect();
     Inferred {
         covariance: refine::covariance(problem, &space, &fit, &deviations),
         margins,

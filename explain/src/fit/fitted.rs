@@ -31,7 +31,7 @@ pub struct Fit {
     pub squares: Vec<f64>,
     /// Number of compared rows, by joint.
     pub count: Vec<f64>,
-    /// Effort of each effect beside the others, computed when it is asked for.
+    /// Effort of each effect, once [`Fit::own_efforts`] was called.
     own: OnceLock<Vec<Column>>,
 }
 
@@ -120,7 +120,7 @@ impl Fit {
         problem.column(&changed, joint)
     }
 
-    /// The effort of each effect beside the others: what is left without it, less what is left with it.
+    /// The effort of each effect: the residual without it minus the residual with it.
     pub fn own_efforts(&self, problem: &Problem) -> &[Column] {
         let all: Vec<usize> = (0..self.actives.len()).collect();
         let of = |&index: &usize| {

@@ -110,8 +110,8 @@ impl<'a> Around<'a> {
         )
     }
 
-    /// Loss in value without one of the set's variants \[nats\], from the products that its columns have beside the others:
-    /// the block of the inverse is the inverse of those. Nothing where a shape or a bound makes it more than that.
+    /// Loss in value when a variant of the set leaves it \[nats\], from the block of the inverse normal matrix: it is the
+    /// inverse of the products of the variant's residual columns. Nothing where the variant has an offset or a bound holds it.
     pub fn loss(&self, variant: usize) -> Option<f64> {
         let objective = self.objective;
         let own = &objective.variants[variant];

@@ -96,7 +96,7 @@ impl Bounded {
         (mean, all)
     }
 
-    /// The same of the free ones.
+    /// Means of the free unknowns, and the inverse of their factor.
     pub fn of_free(&self) -> (DVector<f64>, DMatrix<f64>) {
         let inverse = inverse_of_lower(&self.lower).transpose();
         (&inverse * &self.solved, inverse)

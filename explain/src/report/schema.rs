@@ -199,7 +199,7 @@ pub struct Finding {
     pub t_end: Option<f64>,
     /// Share of the mismatch's variance that it explains, over all joints in units of their noise.
     pub explains: f64,
-    /// By how much the explanation is less probable without it, whatever takes its place \[nats\].
+    /// Logarithm of the odds of the explanation with it against the best one without it \[nats\].
     #[serde(default)]
     pub evidence_nats: f64,
     /// How much effort it is: what is left without it less what is left with it, as root mean square at the joint where
