@@ -383,7 +383,7 @@ fn no_sentence_contradicts_another() {
 
 #[test]
 fn the_robot_is_drawn_with_what_was_found() {
-    let urdf = include_str!("../../../../../tests/data/demo_arm.urdf");
+    let urdf = include_str!("../../tests/data/demo_arm.urdf");
     let Ok(model) = Model::from_urdf(urdf) else {
         panic!("the bundled arm");
     };

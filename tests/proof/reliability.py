@@ -6,8 +6,8 @@ Case by case, from its seed: a small arm (small_arm.py), recordings of it by `ma
 at once, nothing (all under white noise or partly slow noise), something off the library (`make.py`'s and off_list.py's), or an arm as real ones
 are (friction everywhere, its bodies off, and in half of the cases something off the library besides). MuJoCo integrates a quarter of them; of the
 others, and of whole arms, the motion is as commanded (`make.py --followed`), which is faster. Then `explain`, and each finding judged
-by name and place (judge.py). What is there already is not made again; `--table` makes nothing at all. `--fit` prints the numbers of
-stages/explain/src/report/findings/confidence.rs as a logistic regression of right or wrong on these findings gives them.
+by name and place (judge.py). What is there already is not made again; `--table` makes nothing at all. `--fit` prints the two numbers of
+CONFIDENCE in explain/src/report/findings.rs, as a logistic regression of right or wrong on these findings gives them.
 """
 import argparse
 import collections
@@ -33,8 +33,6 @@ WORDS = {"single": "one effect of the library", "combo": "two to four effects of
          "null": "nothing hidden, white or partly slow noise", "unknown": "an effect that the library lacks",
          "arm": "a whole arm: friction on every joint, bodies that differ from the URDF"}
 KINDS = {"single": 0.34, "combo": 0.24, "null": 0.1, "unknown": 0.2, "arm": 0.12}
-OF_POSITION = {"cable_spring", "counterbalance_spring", "torque_ripple"}
-IMITATED = OF_POSITION | {"torque_gain"}
 LIMIT_S = 240.                       # an explanation that takes longer is left out
 
 
@@ -169,12 +167,9 @@ def svg(pairs):
     return "\n".join(parts) + "\n"
 
 
-def grounds(finding, findings):
-    """The row of a finding in the regression: as in confidence.rs."""
-    imitated = finding["effect"] in IMITATED
-    of_position = lambda f: f["effect"] in OF_POSITION and f["joint"] == finding["joint"]
-    another = of_position(finding) and sum(map(of_position, findings)) > 1
-    return [1., math.log(max(finding["over_rest"], 0.01)), min(finding["evidence_nats"], 0.), float(imitated), float(another)]
+def grounds(finding):
+    """The row of a finding in the regression: as in findings.rs."""
+    return [1., math.log1p(max(finding["evidence_nats"], 0.))]
 
 
 def regression(rows, right, spread=2.):
@@ -207,7 +202,7 @@ def show(o):
             pairs.append((finding["confidence"], verdict == "right"))
             by_kind[kind].append(pairs[-1])
             if o.fit:
-                rows.append(grounds(finding, [f for f, _ in findings]))
+                rows.append(grounds(finding))
     print(f"{sum(cases.values())} cases ({', '.join(f'{n} {k}' for k, n in sorted(cases.items()))}), {len(pairs)} findings judged, {neither} neither right nor wrong\n")
     print(table(pairs))
     print("\n| kind | findings | mean confidence | right | said with 0.9 or more | of them right |\n| --- | --- | --- | --- | --- | --- |")
@@ -216,8 +211,8 @@ def show(o):
         mean = lambda x: f"{sum(x) / len(x):.3f}" if x else ""
         print(f"| {WORDS[kind]} | {len(own)} | {mean([c for c, _ in own])} | {mean([r for _, r in own])} | {len(sure)} | {mean(sure)} |")
     if o.fit:
-        names = ["BASE", "PER_LOG_OVER_REST", "PER_NAT_BELOW", "IMITATED", "BESIDE_ANOTHER"]
-        print("\n" + ", ".join(f"{n} {x:.3f}" for n, x in zip(names, regression(rows, [r for _, r in pairs]))))
+        base, slope = regression(rows, [r for _, r in pairs])
+        print(f"\nCONFIDENCE: [{base:.2f}, {slope:.2f}]")
     if o.svg:
         o.svg.write_text(svg(pairs))
 
