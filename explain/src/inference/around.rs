@@ -110,8 +110,8 @@ impl<'a> Around<'a> {
         )
     }
 
-    /// Loss in value when a variant of the set leaves it \[nats\], from the block of the inverse normal matrix: it is the
-    /// inverse of the products of the variant's residual columns. Nothing where the variant has an offset or a bound holds it.
+    /// Loss in value when a variant of the set leaves it \[nats\]: its gain beside the others. Their inverse normal matrix is
+    /// that of the set less the part of the variant's block (Schur complement). Nothing where a bound holds the variant.
     pub fn loss(&self, variant: usize) -> Option<f64> {
         let objective = self.objective;
         let own = &objective.variants[variant];
@@ -120,15 +120,42 @@ impl<'a> Around<'a> {
             .filter(|(_, column)| own.columns().contains(column))
             .map(|(a, _)| a)
             .collect();
-        if own.offset.is_some() || rows.len() < own.deviations.len() {
+        if rows.len() < own.deviations.len() {
             return None;
         }
-        let block = self.inverse.select_rows(&rows).select_columns(&rows);
-        let mut products = block.cholesky()?.inverse();
-        let right = &products * self.mean.select_rows(&rows);
-        for k in 0..rows.len() {
-            products[(k, k)] -= 1.0;
+        let of_rows = self.inverse.select_rows(&rows);
+        let block = of_rows.select_columns(&rows).cholesky()?;
+        // The inverse for the others times what the whole one gave.
+        let less = |whole: DVector<f64>| -> DVector<f64> {
+            &whole - of_rows.tr_mul(&block.solve(&whole.select_rows(&rows)))
+        };
+        // Products of the variant's columns, offset first, with those of the others.
+        let columns: Vec<usize> = own.with_offset().collect();
+        let with_others = |column: &usize| {
+            let gram = objective.gram(*column);
+            let all = self.base.index.iter().map(|&other| gram[other]);
+            let mut cross = DVector::from_iterator(self.base.index.len(), all);
+            rows.iter().for_each(|&row| cross[row] = 0.0);
+            cross
+        };
+        let crosses: Vec<DVector<f64>> = columns.iter().map(with_others).collect();
+        let solved: Vec<DVector<f64>> = (crosses.iter())
+            .map(|cross| less(&self.inverse * cross))
+            .collect();
+        let products = DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
+            objective.gram(columns[a])[columns[b]] - crosses[a].dot(&solved[b])
+        });
+        // The measurement without the offsets of the others.
+        let mut mean = less(self.mean.clone());
+        if own.offset.is_some() {
+            mean += &solved[0];
         }
+        let right = DVector::from_fn(columns.len(), |a, _| {
+            let gram = objective.gram(columns[a]);
+            let others = self.base.offsets.iter().filter(|o| Some(**o) != own.offset);
+            let offsets: f64 = others.map(|&o| gram[o]).sum();
+            objective.columns[columns[a]].right - offsets - crosses[a].dot(&mean)
+        });
         Some(objective.gain(own, &objective.own[variant], &products, &right))
     }
 
@@ -285,6 +312,12 @@ mod tests {
         let last = objective.variants.len() - 1;
         let set = vec![0, 2, last];
         let around = Around::new(&objective, &set).unwrap();
+        for v in [0, 2, last] {
+            let less: Set = set.iter().copied().filter(|w| *w != v).collect();
+            let own = objective.score(&set) - objective.score(&less);
+            let loss = around.loss(v).unwrap();
+            assert!((loss - own).abs() < AS_LIKELY, "{v}: {loss}, {own}");
+        }
         for removed in [vec![], vec![0], vec![last], vec![2, last]] {
             let less: Set = set
                 .iter()

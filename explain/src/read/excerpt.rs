@@ -51,15 +51,16 @@ mod tests {
     use super::*;
     use crate::fixture::{model, recording};
 
-    /// Recordings of these lengths at 1 Hz \[s\].
+    /// Recordings of these lengths at 5 Hz \[s\].
     fn session(lengths_s: &[usize]) -> Vec<Recording> {
         let of = |length: &usize| {
             let mut one = recording(&model(), 1, |_, _, _| {});
-            one.time_s = (0..=*length).map(|k| k as f64).collect();
+            let last = 5 * length;
+            one.time_s = (0..=last).map(|k| 0.2 * k as f64).collect();
             for column in [&mut one.position, &mut one.velocity, &mut one.effort] {
-                column.resize(2 * (length + 1), 0.0);
+                column.resize(2 * (last + 1), 0.0);
             }
-            one.sample_of_row = (0..=*length).map(Some).collect();
+            one.sample_of_row = (0..=last).map(Some).collect();
             one
         };
         lengths_s.iter().map(of).collect()
@@ -69,7 +70,7 @@ mod tests {
     fn a_session_of_minutes_is_fitted_whole() {
         let mut all = session(&[100, 200]);
         assert_eq!(excerpts(&mut all), None);
-        assert_eq!(all[1].len(), 201);
+        assert_eq!(all[1].len(), 1001);
     }
 
     #[test]
@@ -79,7 +80,7 @@ mod tests {
         assert!((said.whole_s - 3600.0).abs() < 1e-9);
         assert!((300.0..500.0).contains(&said.kept_s), "{said:?}");
         for (recording, whole_s) in all.iter().zip([1800.0, 1200.0, 600.0]) {
-            let share = recording.len() as f64 / whole_s;
+            let share = recording.len() as f64 / (5.0 * whole_s);
             assert!((0.08..0.16).contains(&share), "{share} of {whole_s} s");
             assert!(recording.time_s.last().unwrap() > &(0.6 * whole_s));
             assert_eq!(recording.position.len(), 2 * recording.len());

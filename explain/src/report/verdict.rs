@@ -4,27 +4,19 @@ use tauscope_dynamics::terms::UNKNOWN;
 
 use crate::report::schema::{Finding, Remaining, Verdict};
 
-/// A finding with less confidence names nothing.
-/// Statistical: it is more likely wrong than right.
-const NAMES: f64 = 0.5;
-
 /// The verdict, given what remains beyond the noise. Where the `twin_is_topic`, a remainder beside findings decides
-/// nothing: another simulation has its own delays and friction, and they are no physics of the arm. Where no finding is more
-/// likely right than wrong, an unknown remains. A fault of the recorded velocity does not decide, because velocities are
-/// computed from the positions.
+/// nothing: another simulation has its own delays and friction, and they are no physics of the arm. A fault of the
+/// recorded velocity does not decide, because velocities are computed from the positions.
 pub fn verdict(findings: &[Finding], remaining: &[Remaining], twin_is_topic: bool) -> Verdict {
     let findings: Vec<&Finding> = findings.iter().filter(|f| !f.is_of_velocity()).collect();
     let is_described = |f: &&Finding| f.effect == UNKNOWN.name && !f.is_body_off();
     let described = findings.iter().any(is_described);
-    let named = twin_is_topic || findings.iter().any(|f| f.confidence >= NAMES);
     let decides = !twin_is_topic || findings.is_empty();
     let of_the_arm = !remaining.is_empty() && decides;
     if described || of_the_arm {
         Verdict::UnknownRemains
     } else if findings.is_empty() {
         Verdict::NothingMissing
-    } else if !named {
-        Verdict::UnknownRemains
     } else {
         Verdict::Explained
     }
