@@ -135,7 +135,9 @@ impl<'a> Around<'a> {
             let gram = objective.gram(*column);
             let all = self.base.index.iter().map(|&other| gram[other]);
             let mut cross = DVector::from_iterator(self.base.index.len(), all);
-            rows.iter().for_each(|&row| cross[row] = 0.0);
+            for &row in &rows {
+                cross[row] = 0.0;
+            }
             cross
         };
         let crosses: Vec<DVector<f64>> = columns.iter().map(with_others).collect();
