@@ -67,7 +67,7 @@ def main():
     parser.add_argument("--fit", nargs="+", type=pathlib.Path, required=True)
     parser.add_argument("--holdout", nargs="+", type=pathlib.Path, required=True)
     parser.add_argument("--report", type=pathlib.Path, help="the folder of a report of the same hold-out")
-    parser.add_argument("--ridge", type=float, default=0.05, help="standard deviation of the noise over that of the parameters, in units of both")
+    parser.add_argument("--ridge", type=float, default=0.05, help="root of the ridge, where each column has a mean square of one")
     options = parser.parse_args()
     model = pin.buildModelFromUrdf(str(options.robot))
     data, n = model.createData(), model.nv

@@ -12,7 +12,7 @@ use crate::kinematic_tree::length_m;
 /// long by its frames: from one end to the other. Physical: a uniform rod ends the root of 3 radii of gyration from its centre (its moment of
 /// inertia is m l²/12), a plumper body nearer.
 const MOST_GYRATIONS: f64 = 1.732;
-/// Where one is drawn, it is off by this at most \[m\].
+/// Largest offset of a centre of mass that is drawn at random \[m\].
 /// Tuned: for simulated cells only; not swept.
 const MOST_DRAWN_M: f64 = 0.06;
 

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::Inertia;
 
-/// The same where one is drawn, at most.
+/// Largest error of a mass that is drawn at random, as a share of the link's mass.
 /// Tuned: for simulated cells only; not swept.
 const MOST_DRAWN: f64 = 0.6;
 

@@ -59,10 +59,12 @@ pub fn step(signal: impl Iterator<Item = f64>) -> Option<f64> {
     steps.min_by(f64::total_cmp)
 }
 
-/// White noise of the measured effort of a joint \[effort unit\].
+/// White noise of the measured effort of a joint \[effort unit\]. Not a number for recordings of poses, whose differences are
+/// gravity's.
 pub fn white_noise(recordings: &[Recording], joint: usize, n: usize) -> f64 {
     let mut all: Vec<f64> = recordings
         .iter()
+        .filter(|recording| !recording.is_of_poses())
         .map(|recording| {
             let signal: Vec<f64> = recording
                 .effort

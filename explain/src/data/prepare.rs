@@ -20,8 +20,8 @@ const CUTOFF_HZ: f64 = 8.0;
 /// The cutoff is at most this share of the sample rate.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const CUTOFF_OF_RATE: f64 = 0.1;
-/// The same where the samples are poses, which no filter may mix. Derived: at half the rate, the highest frequency that
-/// they can have, the filter then passes all but 2^-12.
+/// Cutoff over sample rate for recordings of poses, which no filter may mix. Derived: at half the rate, the Nyquist
+/// frequency, the filter's response `1 / (1 + (f / fc)^6)` is then above 0.999.
 const POSES_OF_RATE: f64 = 2.0;
 /// The cutoff of the motion's smoother over that of the comparison.
 /// Physical: a smoother with the response `1 / (1 + (f / fc)^6)` still passes 98 % at half its cutoff.
@@ -100,7 +100,7 @@ impl Problem {
                 let mut signal: Vec<f64> = of_joint
                     .map(|at| (recording.effort[at] - full.beside[at]) * unit_nm[j])
                     .collect();
-                // The effort of poses has no faster changes than its own: its noise is estimated beside an explanation alone.
+                // Fourth differences from pose to pose are gravity's, not noise. The inference estimates the noise of poses.
                 let (white, new) = if recording.is_of_poses() {
                     (0.0, 1.0)
                 } else {

@@ -110,8 +110,8 @@ impl<'a> Around<'a> {
         )
     }
 
-    /// Loss in value when a variant of the set leaves it \[nats\]: its gain beside the others. Their inverse normal matrix is
-    /// that of the set less the part of the variant's block (Schur complement). Nothing where a bound holds the variant.
+    /// Loss in value when a variant leaves the set \[nats\], equal to its gain next to the other variants. Their inverse
+    /// normal matrix follows from the set's by the Schur complement. Nothing where a bound holds the variant.
     pub fn loss(&self, variant: usize) -> Option<f64> {
         let objective = self.objective;
         let own = &objective.variants[variant];

@@ -85,18 +85,18 @@ pub fn notes(
 ) -> Vec<String> {
     let mut notes = losses(input);
     notes.extend(remaining.iter().map(|remaining| remaining.sentence.clone()));
+    let of_poses = input.fit.iter().any(Recording::is_of_poses);
     let names: Vec<&str> = input.model.joint_names().collect();
     for (j, name) in names.iter().enumerate() {
         let ratio = (found.variance[j].sqrt()) / problem.white_noise[j].max(1e-12);
         let is_told = remaining.iter().any(|remaining| remaining.joint == *name);
-        if ratio > LOUD && !is_told {
+        if ratio > LOUD && !is_told && !of_poses {
             notes.push(format!(
                 "The remaining error at joint {name} is {ratio:.0} times the measurement's white noise. No curve of the motion or of \
                  time predicts it from one recording to the next, so it is slow noise, or an effect of something that was not recorded."
             ));
         }
     }
-    let of_poses = input.fit.iter().any(Recording::is_of_poses);
     if of_poses {
         notes.push(
             "The samples are too far apart to tell a motion, so they were compared as poses that the arm holds. That shows gravity, \
