@@ -138,19 +138,12 @@ pub fn finding(effect: &str) -> Finding {
     Finding {
         effect: effect.to_owned(),
         joint: Some("joint1".to_owned()),
-        link: None,
         parameters: [("coulomb_nm".to_owned(), 4.1.into())].into(),
         intervals_95: [("coulomb_nm".to_owned(), [3.9, 4.3])].into(),
-        in_amperes: false,
-        slides: false,
         confidence: 0.999,
-        recording: None,
-        t_start: None,
-        t_end: None,
         explains: 0.63,
         evidence_nats: 40.0,
         effort_rms: 2.0,
-        equivalent_to: Vec::new(),
-        sentence: String::new(),
+        ..Finding::default()
     }
 }

@@ -170,7 +170,7 @@ pub const WITHOUT_LAW: &str = "without_law";
 pub const SHARE_OF_CARRIED: &str = "share_of_carried";
 
 /// An effect that the twin leaves out.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Finding {
     /// Canonical name.
     pub effect: String,

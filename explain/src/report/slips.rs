@@ -121,20 +121,12 @@ fn finding(slip: &Slip, joints: &[String], unit: &str) -> Finding {
     Finding {
         effect: UNKNOWN.name.to_owned(),
         joint: joint.map(|j| joints[j].clone()),
-        link: None,
         parameters,
-        intervals_95: BTreeMap::new(),
-        in_amperes: false,
-        slides: false,
         confidence: CONFIDENCE,
-        recording: None,
-        t_start: None,
-        t_end: None,
         explains: slip.share,
-        evidence_nats: 0.0,
         effort_rms: slip.mended.iter().map(fall).fold(0.0, f64::max),
-        equivalent_to: Vec::new(),
         sentence: sentence(slip, joints, unit),
+        ..Finding::default()
     }
 }
 

@@ -3,8 +3,6 @@
 //! Programs that read the findings alone learn so which joint to look at. The twin stays as it is, for there is nothing to
 //! correct it by.
 
-use std::collections::BTreeMap;
-
 use serde_json::Value;
 use tauscope_dynamics::terms::UNKNOWN;
 
@@ -63,25 +61,16 @@ fn finding(remaining: &Remaining, confidence: f64) -> Finding {
     Finding {
         effect: UNKNOWN.name.to_owned(),
         joint: Some(remaining.joint.clone()),
-        link: None,
         parameters: parameters
             .map(|(name, value)| (name.to_owned(), value))
             .into(),
-        intervals_95: BTreeMap::new(),
-        in_amperes: false,
-        slides: false,
         confidence,
-        recording: None,
-        t_start: None,
-        t_end: None,
-        explains: 0.0,
-        evidence_nats: 0.0,
         effort_rms: remaining.largest_rms(),
-        equivalent_to: Vec::new(),
         sentence: format!(
             "Joint {} has something that no effect or curve describes. {}",
             remaining.joint, remaining.sentence
         ),
+        ..Finding::default()
     }
 }
 
