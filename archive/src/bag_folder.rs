@@ -212,12 +212,13 @@ fn own_files(folder: &Path) -> Result<BTreeMap<OsString, PathBuf>, ArchiveError>
 fn find(folder: &Path, path: &Path, own: &BTreeMap<OsString, PathBuf>) -> Option<PathBuf> {
     let direct = folder.join(path);
     let plain = unpacked_path(path);
-    if plain.is_none() && direct.exists() {
+    // `exists` would take the folder itself, listed as "" or ".".
+    if plain.is_none() && direct.is_file() {
         return Some(direct);
     }
     let name = plain.as_deref().unwrap_or(path).file_name()?;
     let own = own.get(name).cloned();
-    own.or_else(|| direct.exists().then_some(direct))
+    own.or_else(|| direct.is_file().then_some(direct))
 }
 
 /// `bag_10.mcap` comes after `bag_9.mcap`.

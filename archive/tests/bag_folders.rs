@@ -80,6 +80,22 @@ fn missing_files_are_reported_as_lost() {
     assert!(error.contains("a_0.mcap and 3 more"), "{error}");
 }
 
+/// A random `metadata.yaml` listed the empty path, which was opened as the folder itself.
+#[test]
+fn a_folder_that_is_listed_as_a_file_is_not_there() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder.path().join("bag_0.mcap"), Compression::None, 5);
+    for listed in ["", ".", "/", ".."] {
+        fs::write(
+            folder.path().join("metadata.yaml"),
+            metadata(&[listed], "", ""),
+        )
+        .unwrap();
+        let recording = Recording::open(folder.path()).unwrap();
+        assert_eq!(read_all(&recording).0.len(), 6, "{listed:?}");
+    }
+}
+
 #[test]
 fn messages_in_an_unknown_compression_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -160,7 +160,11 @@ fn conclude(
 ) -> Result<Outcome, TermError> {
     let input = context.input;
     progress(0.95, "checking on held-out recordings");
-    let mut proof = context.proof(&judged.problem, &judged.before, &judged.found)?;
+    let mut proof = context.proof(
+        &judged.problem,
+        [&judged.before, &judged.found],
+        judged.kept.clone(),
+    )?;
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
     let noise_floor = noise_floor(input);
     let units = (&noise_floor[..], context.unit_nm, unit);

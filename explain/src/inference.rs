@@ -10,6 +10,7 @@
 mod around;
 mod bounded;
 mod curves;
+mod estimated;
 mod laws;
 mod left_out;
 mod margins;
@@ -38,6 +39,7 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
 
+pub use estimated::{Estimated, estimated};
 use left_out::LeftOut;
 use margins::margins;
 pub use margins::{AS_LIKELY, Alternative};
@@ -73,6 +75,8 @@ pub struct Inferred {
     pub bodies: Vec<Active>,
     /// Features of the motion that predict what is left.
     pub remaining: Vec<remainder::Predicted>,
+    /// Joints whose effort in pieces of recordings that are left out in turn is predicted better without the lasting effects.
+    pub unpredictive: Vec<usize>,
 }
 
 /// Searches for the effects of a problem, from the effects `start` on. `bodies` says whether the robot's bodies are known.
@@ -117,13 +121,23 @@ pub fn infer(
         if is_settled || round == ROUNDS {
             let all = effects(&solution.fit);
             let (margins, alternatives) = margins(&objective, &taken.set, &all);
+            let residuals = left_out(problem, &space, &solution.fit, &state.efforts);
+            let residuals = residuals.unwrap_or_default();
+            let features = remainder::features(problem, &solution.fit);
             return Inferred {
                 covariance: solution.covariance,
                 margins,
                 alternatives,
                 smallest: around::smallest(&objective, &taken.set),
                 bodies: nuisance::mean_bodies(&nuisances, solution.nuisances.as_slice()),
-                remaining: remaining(problem, &space, &solution.fit, &state.efforts),
+                unpredictive: unpredictive(
+                    problem,
+                    &space,
+                    &solution.fit,
+                    &state.efforts,
+                    &residuals,
+                ),
+                remaining: remainder::predicted(&space, &residuals, &features),
                 fit: solution.fit,
             };
         }
@@ -225,31 +239,6 @@ fn follow(
     state.estimate_tempers(fit, nuisances, &columns, &measured);
 }
 
-/// An explanation as it is, with what is known of it: its numbers stay, and nothing is added.
-pub fn around(problem: &Problem, hypotheses: &[Hypothesis], fit: Fit, bodies: bool) -> Inferred {
-    let mut state = State::new(problem, bodies);
-    let sizes = state.sizes(&fit);
-    let nuisances = nuisance::of(problem, &fit, &sizes, bodies, state.scales);
-    let given = variants::all(problem, &fit, hypotheses, &state.efforts);
-    let measured = variants::measured(problem, &fit);
-    state.estimate_noise(&fit, &nuisances, &given, &measured, false);
-    let space = state.space(&nuisances);
-    let objective = Objective::new(&space, &measured, given);
-    let own: Set = (0..fit.actives.len()).collect();
-    let (margins, alternatives) = margins(&objective, &own, &effects(&fit));
-    let variants = objective.variants[..own.len()].iter();
-    let deviations: Vec<f64> = variants.flat_map(Variant::all_deviations).collect();
-    Inferred {
-        covariance: refine::covariance(problem, &space, &fit, &deviations),
-        margins,
-        alternatives,
-        smallest: around::smallest(&objective, &own),
-        bodies: Vec::new(),
-        remaining: Vec::new(),
-        fit,
-    }
-}
-
 /// The set with only one new effect whose effort is not linear in its numbers and that several joints feel, and whether any
 /// was left for later: such effects imitate each other until the numbers of one are refined.
 fn first_that_bends(objective: &Objective<'_>, own: &Set, found: Set) -> (Set, bool) {
@@ -317,26 +306,49 @@ fn tangents(problem: &Problem, fit: &Fit, efforts: &[Magnitude]) -> (Vec<Column>
     (columns, measured)
 }
 
-/// Features of the motion that predict what a fit leaves in pieces of recordings that it was not fitted on.
-fn remaining(
+/// Whitened residuals in pieces of recordings that are left out of a fit in turn, by joint and piece.
+fn left_out(
     problem: &Problem,
     space: &Space,
     fit: &Fit,
     efforts: &[Magnitude],
-) -> Vec<remainder::Predicted> {
+) -> Option<Vec<Vec<DVector<f64>>>> {
     let pieces = rows::pieces(problem);
     let (columns, measured) = tangents(problem, fit, efforts);
-    let Some(left_out) = LeftOut::new(space, &columns, &measured, pieces) else {
+    let left_out = LeftOut::new(space, &columns, &measured, pieces)?;
+    let of_joint = |joint: usize| {
+        let of_piece = |piece: usize| left_out.residual(joint, piece);
+        (0..pieces).map(of_piece).collect()
+    };
+    Some((0..problem.joints).map(of_joint).collect())
+}
+
+/// Joints whose residuals in pieces that are left out of the fit are smaller without the effects that last.
+fn unpredictive(
+    problem: &Problem,
+    space: &Space,
+    fit: &Fit,
+    efforts: &[Magnitude],
+    residuals: &[Vec<DVector<f64>>],
+) -> Vec<usize> {
+    let lasts = |active: &&Active| {
+        active.hypothesis.lasts() && !active.hypothesis.is_torque_scale()
+    };
+    let (lasting, others): (Vec<&Active>, Vec<&Active>) = fit.actives.iter().partition(lasts);
+    let feels = |joint: usize| {
+        let only = |active: &&&Active| active.hypothesis.only_joint().is_none_or(|own| own == joint);
+        lasting.iter().any(|active| only(&active))
+    };
+    let others = others.into_iter().cloned().collect();
+    let without = Fit::beside(problem, others, Some(fit));
+    let Some(without) = left_out(problem, space, &without, efforts) else {
         return Vec::new();
     };
-    let residuals: Vec<Vec<DVector<f64>>> = (0..problem.joints)
-        .map(|joint| {
-            (0..pieces)
-                .map(|piece| left_out.residual(joint, piece))
-                .collect()
-        })
-        .collect();
-    remainder::predicted(space, &residuals, &remainder::features(problem, fit))
+    let square = |of_joint: &[DVector<f64>]| of_joint.iter().map(DVector::norm_squared).sum::<f64>();
+    let joints = (0..problem.joints).filter(|joint| feels(*joint));
+    joints
+        .filter(|&joint| square(&residuals[joint]) >= square(&without[joint]))
+        .collect()
 }
 
 #[cfg(test)]
@@ -351,7 +363,8 @@ mod tests {
         add: impl FnMut(&[f64], &[f64], &mut [f64]),
     ) -> Vec<(&'static str, usize, Vec<f64>)> {
         let problem = problem_with(3, add);
-        let hypotheses = library::hypotheses(&problem.model, true, &BTreeSet::new());
+        let mut hypotheses = library::hypotheses(&problem.model, true, &BTreeSet::new());
+        hypotheses.extend(library::unnamed(&problem.model, true, &BTreeSet::new()));
         let inferred = infer(&problem, &hypotheses, Vec::new(), true, &|_| {});
         assert!(inferred.remaining.is_empty(), "{:?}", inferred.remaining);
         let actives = inferred.fit.actives.iter();

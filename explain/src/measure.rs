@@ -3,8 +3,8 @@
 //!
 //! An explanation names what is certain and leaves out what is not, so its numbers come and go. What is followed over
 //! weeks needs one set of numbers with intervals. This fits all effects that [`is_followed`] at once, beside the corrected
-//! twin that the input starts from: weighted least squares over all joints with the intervals of `fit`, as Swevers,
-//! Verdonck and De Schutter 2007 do it with a fixed set of parameters.
+//! twin that the input starts from, as Swevers, Verdonck and De Schutter 2007 do it with a fixed set of parameters: see
+//! [`estimated`].
 //!
 //! [`is_followed`]: tauscope_dynamics::terms::Traits::is_followed
 
@@ -15,12 +15,10 @@ use tauscope_dynamics::terms::{PlaceKind, TermError, TermSpec, Traits};
 use crate::context::Context;
 use crate::data::problem::Problem;
 use crate::data::units::scales;
-use crate::fit::covariance::covariance;
-use crate::fit::fitted::Fit;
-use crate::fit::interval::{half_width_95, parameter_deviations};
+use crate::fit::interval::{HALF_WIDTH_95, parameter_deviations};
+use crate::inference::{Estimated, estimated};
 use crate::physics::active::{Active, Hypothesis};
 use crate::physics::torque_scale::unknown_scales;
-use crate::propose::base::Base;
 use crate::read::audit;
 use crate::read::input::Input;
 use crate::read::recording::Recording;
@@ -99,19 +97,10 @@ pub fn measure(input: &Input) -> Result<Result<Measured, String>, TermError> {
             .iter()
             .map(|one| one.with(vec![0.0; one.effect.coordinates.len()])),
     );
-    let mut fit = Fit::new(&problem, actives).refined(&problem);
-    let library = searched.len();
-    for hypothesis in searched {
-        let proposal = Base::new(&problem, &fit, library).propose(hypothesis);
-        if let Some(proposal) = proposal.filter(|one| one.evidence() > 0.0) {
-            let mut with = fit.actives.clone();
-            with.push(proposal.active);
-            fit = Fit::new(&problem, with).refined(&problem);
-        }
-    }
+    let estimated = estimated(&problem, actives, &searched, input.bodies);
     let is_known = |joint| context.unscaled.iter().all(|(other, _)| *other != joint);
     let in_nm = (0..n).map(is_known).collect();
-    let numbers = numbers(&context, &problem, &fit);
+    let numbers = numbers(&context, &problem, &estimated);
     Ok(Ok(Measured { numbers, in_nm }))
 }
 
@@ -145,9 +134,8 @@ fn gains(context: &Context<'_>, moves: &[bool]) -> Vec<Active> {
 }
 
 /// All numbers of a fit, the twin's own added.
-fn numbers(context: &Context<'_>, problem: &Problem, fit: &Fit) -> Vec<Number> {
-    let spread = covariance(problem, fit);
-    let widths = half_width_95(problem);
+fn numbers(context: &Context<'_>, problem: &Problem, estimated: &Estimated) -> Vec<Number> {
+    let Estimated { fit, covariance } = estimated;
     let own = of_twin(context, problem);
     let mut all = Vec::new();
     for (index, active) in fit.actives.iter().enumerate() {
@@ -159,7 +147,7 @@ fn numbers(context: &Context<'_>, problem: &Problem, fit: &Fit) -> Vec<Number> {
         // One number tells each effect: its first parameter.
         let name = effect.parameters[0].name;
         let value = active.parameters()[0];
-        let half = widths * parameter_deviations(problem, fit, &spread, index)[0];
+        let half = HALF_WIDTH_95 * parameter_deviations(problem, fit, covariance, index)[0];
         let is_gain = active.hypothesis.is_torque_scale();
         let known = half.is_finite() && half > 0.0;
         if !known || (is_gain && half > LEAST_KNOWN_GAIN * value.abs()) {

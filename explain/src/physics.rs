@@ -16,7 +16,6 @@ pub mod friction;
 pub mod library;
 pub mod parameter_units;
 pub mod parts;
-pub mod plausible;
 pub mod shaped_bodies;
 pub mod start;
 pub mod torque_scale;

@@ -7,7 +7,6 @@
 
 pub(crate) mod corrected_twin;
 pub(crate) mod findings;
-pub(crate) mod handed_out;
 pub(crate) mod holdout;
 pub(crate) mod locate;
 mod look_at;

@@ -62,17 +62,6 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// The same where one recording does not count.
-    #[must_use]
-    pub fn without(&self, track: usize) -> Self {
-        let mut others = self.clone();
-        for joint in 0..self.joints {
-            let rows = others.joint_rows(joint);
-            others.weight[rows][self.tracks[track].rows()].fill(0.0);
-        }
-        others
-    }
-
     /// When the first recording begins and the last one ends \[s from the start of the session\].
     pub fn session_s(&self) -> (f64, f64) {
         let first_s = |t: &FitTrack| t.track.session_s;

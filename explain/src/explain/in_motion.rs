@@ -8,7 +8,7 @@ use crate::data::problem::Problem;
 use crate::data::remedies::{self, Remedy, Slip};
 use crate::data::same_robot::Likeness;
 use crate::explain::judged::{Judged, Stop};
-use crate::fit::body_prior::make_consistent;
+use crate::fit::consistent_bodies::make_consistent;
 use crate::fit::fitted::Fit;
 use crate::inference;
 use crate::physics::active::Active;
@@ -30,12 +30,9 @@ impl Context<'_> {
             Err(stop) => return Ok(Err(stop)),
         };
         let mut hypotheses = self.hypotheses();
-        if input.bodies {
-            hypotheses.extend(library::unnamed_bodies(&input.model, &input.without));
-        }
+        hypotheses.extend(library::unnamed(&input.model, input.bodies, &input.without));
         // Unknown torque scales are fitted before the twin is compared.
-        let scales = || torque_scale::unknown_scales(&self.unscaled);
-        let mut start = scales();
+        let mut start = torque_scale::unknown_scales(&self.unscaled);
         // A base that is turned so far that no search in small steps would find it.
         let tilt = (hypotheses.iter()).find(|h| h.effect.place == PlaceKind::Base);
         start.extend(tilt.zip(turn).map(|(tilt, turn)| tilt.with(turn.to_vec())));
@@ -43,7 +40,7 @@ impl Context<'_> {
         let say = |text: &str| progress(0.1, text);
         let inferred = inference::infer(&problem, &hypotheses, start, input.bodies, &say);
         progress(0.8, "wording the findings");
-        let before = Fit::new(&problem, scales()).refined(&problem);
+        let before = torque_scale::fitted(&problem, &self.unscaled);
         let named = findings::of(&problem, &inferred, &before, self, &joints);
         let undetectable = findings::undetectable(&inferred.smallest, self, &joints);
         // A twin that is corrected has the bodies' mean changes, too, which are too small for a finding.
@@ -58,6 +55,7 @@ impl Context<'_> {
             named,
             undetectable,
             remaining: inferred.remaining,
+            kept: inferred.unpredictive,
             problem,
         }))
     }

@@ -19,6 +19,8 @@ pub struct Judged {
     pub named: Named,
     /// The smallest effects that would have been found.
     pub undetectable: Vec<Undetectable>,
+    /// Joints that keep the twin as it was.
+    pub kept: Vec<usize>,
     /// Features that predict the residual of the fitted recordings.
     pub remaining: Vec<Predicted>,
 }

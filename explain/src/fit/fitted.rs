@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use crate::data::column::{Column, Columns};
 use crate::data::efforts::{Efforts, TrackEfforts};
 use crate::data::problem::Problem;
-use crate::fit::least_squares::Products;
+use crate::fit::least_squares::weighted_dot;
 use crate::parallel;
 use crate::physics::active::{Active, Hypothesis};
 use crate::physics::columns::columns;
@@ -71,10 +71,16 @@ impl Fit {
             }
         }
         fit.residual = residual;
-        let products = Products::new(problem, &[], &fit.residual, None);
-        fit.variance = variances(problem, &products.square, &products.count);
-        fit.squares = products.square;
-        fit.count = products.count;
+        for joint in 0..problem.joints {
+            let rows = problem.joint_rows(joint);
+            let (weight, left) = (&problem.weight[rows.clone()], &fit.residual[rows]);
+            let (square, count) = (weighted_dot(weight, left, left), weight.iter().sum::<f64>());
+            let white = problem.white_noise[joint] * problem.white_noise[joint];
+            let variance = (square / count.max(1.0)).max(white).max(LEAST_VARIANCE);
+            fit.squares.push(square);
+            fit.count.push(count);
+            fit.variance.push(variance);
+        }
         fit
     }
 
@@ -96,11 +102,6 @@ impl Fit {
         shape: &[f64],
     ) -> Arc<Columns> {
         columns(problem, (&self.actives, &self.parts), hypothesis, shape)
-    }
-
-    /// Log-likelihood of the residual as white noise, up to a constant: `-n/2 ln(variance)` summed over joints.
-    pub fn likelihood(&self) -> f64 {
-        likelihood(&self.variance, &self.count)
     }
 
     /// The effort that another effect would add.
@@ -141,28 +142,4 @@ impl Fit {
         actives.remove(index);
         Self::beside(problem, actives, Some(self))
     }
-
-    /// The fit with one more effect, not refined.
-    #[must_use]
-    pub fn with(&self, problem: &Problem, active: Active) -> Self {
-        let mut actives = self.actives.clone();
-        actives.push(active);
-        Self::beside(problem, actives, Some(self))
-    }
-}
-
-/// `-n/2 ln(variance)`, summed over joints.
-pub fn likelihood(variance: &[f64], count: &[f64]) -> f64 {
-    variance
-        .iter()
-        .zip(count)
-        .map(|(v, n)| -0.5 * n * v.ln())
-        .sum()
-}
-
-/// Variances by joint from sums of squares, not below the white noise.
-pub fn variances(problem: &Problem, squares: &[f64], count: &[f64]) -> Vec<f64> {
-    let all = squares.iter().zip(count).zip(&problem.white_noise);
-    all.map(|((s, n), noise)| (s / n.max(1.0)).max(noise * noise).max(LEAST_VARIANCE))
-        .collect()
 }

@@ -4,7 +4,6 @@ use nalgebra::DMatrix;
 use tauscope_dynamics::terms::CoordinateKind;
 
 use crate::data::problem::Problem;
-use crate::fit::covariance::LAGS;
 use crate::fit::fitted::Fit;
 use crate::physics::active::Active;
 use crate::physics::parameter_units::unit;
@@ -21,28 +20,12 @@ const NEAR_GAP_PERIODS: f64 = 0.5;
 /// Half width of a 95 % interval of a normal variable, in standard deviations.
 /// Statistical: the 97.5 % quantile of the standard normal distribution.
 pub const HALF_WIDTH_95: f64 = 1.96;
-/// Coefficients of b, b² and b³ in the 97.5 % critical value with Bartlett's weights.
-/// Statistical: Kiefer and Vogelsang, "A New Asymptotic Theory for Heteroskedasticity-Autocorrelation Robust Tests",
-/// 2005, table 1.
-const BARTLETT_97_5: [f64; 3] = [2.9694, 0.4160, -0.5324];
 /// Step of the difference quotient of a parameter, as a share of its coordinate's standard deviation.
 /// Resolution: between the curvature over a long step and the rounding over a short one.
 const STEP_OF_DEVIATION: f64 = 1e-3;
 /// The same as a share of the coordinate, where its standard deviation is tiny.
 /// Resolution: above the rounding of f64.
 const LEAST_RELATIVE_STEP: f64 = 1e-9;
-
-/// Half width of a 95 % interval of a number, in its standard deviations by
-/// [`covariance`](crate::fit::covariance::covariance).
-///
-/// The covariance is itself an estimate from a limited number of rows. On average it is too small, the more so the
-/// larger the share b of its lags in the rows is.
-pub fn half_width_95(problem: &Problem) -> f64 {
-    let lags = (LAGS + 1) as f64 / f64::max(problem.rows as f64, 1.0);
-    let b = lags.min(1.0);
-    let [first, second, third] = BARTLETT_97_5;
-    HALF_WIDTH_95 + b * (first + b * (second + b * third))
-}
 
 /// Standard deviations of the parameters of one effect, from the covariance of its coordinates. Systematic errors are
 /// added: of smoothing and differentiation, and of a time that lies anywhere between two rows.
@@ -145,50 +128,4 @@ fn between_rows(problem: &Problem, active: &Active, c: usize) -> f64 {
         })
         .map(|[first, last]| last - first)
         .fold(0.0, f64::max)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::fit::covariance::covariance;
-    use crate::fixture::{at_joint, problem_with};
-
-    const TRUE: f64 = 0.8;
-
-    /// A viscous friction and its half width, fitted with noise from a seed.
-    fn fitted(seed: u64) -> (f64, f64) {
-        let problem = problem_with(seed, |_, qd, effort| effort[0] += TRUE * qd[0]);
-        let active = at_joint("viscous_friction", 0).with(vec![0.0]);
-        let fit = Fit::new(&problem, vec![active]).refined(&problem);
-        let spread = covariance(&problem, &fit);
-        let deviation = parameter_deviations(&problem, &fit, &spread, 0)[0];
-        (
-            fit.actives[0].coordinates[0],
-            half_width_95(&problem) * deviation,
-        )
-    }
-
-    #[test]
-    fn intervals_hold_the_true_number_nearly_always_and_are_no_wider_than_they_must_be() {
-        let all: Vec<(f64, f64)> = (1..=20).map(fitted).collect();
-        let held = all
-            .iter()
-            .filter(|(value, half)| (value - TRUE).abs() <= *half);
-        assert!(held.count() >= 17, "{all:?}");
-        let error = |(value, _): &(f64, f64)| (value - TRUE).powi(2);
-        let rms = (all.iter().map(error).sum::<f64>() / 20.0).sqrt();
-        let half = all.iter().map(|(_, half)| half).sum::<f64>() / 20.0;
-        assert!(
-            half < 6.0 * HALF_WIDTH_95 * rms,
-            "{half} for errors of {rms}"
-        );
-    }
-
-    #[test]
-    fn fewer_rows_make_a_half_width_wider_than_the_normal_one() {
-        let mut problem = problem_with(1, |_, _, _| {});
-        let many = half_width_95(&problem);
-        problem.rows = 20;
-        assert!(many > HALF_WIDTH_95 && half_width_95(&problem) > many + 0.5);
-    }
 }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::sync::Arc;
 
-use tauscope_dynamics::terms::{CoordinateKind, Layer, PlaceKind, Scale};
+use tauscope_dynamics::terms::{CoordinateKind, Layer, Scale};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
@@ -18,7 +18,7 @@ use crate::physics::parts::is_kept;
 /// Resolution: between the curvature over a long step and the rounding over a short one.
 const SHAPE_STEP: f64 = 1e-5;
 /// Step of the difference quotient of a time \[s\].
-/// Tuned: by hand, one sample at 100 Hz, on no recorded seeds; not swept.
+/// Resolution: about one sample.
 const TIME_STEP_S: f64 = 0.01;
 
 impl Fit {
@@ -31,36 +31,8 @@ impl Fit {
 
     /// How the explained effort changes with each free coordinate.
     pub fn jacobian(&self, problem: &Problem) -> Vec<Arc<Column>> {
-        self.jacobian_at(problem, None)
-    }
-
-    /// The same for the effects that act on these joints; for all effects if `joints` is `None`.
-    pub fn jacobian_at(&self, problem: &Problem, joints: Option<&[usize]>) -> Vec<Arc<Column>> {
-        let free = self.parameters_at(joints);
-        let of = |i: usize| {
-            free.iter()
-                .filter(move |(active, _)| *active == i)
-                .map(|(_, c)| *c)
-        };
-        let touching = (0..self.actives.len()).filter(|&i| of(i).next().is_some());
-        touching
-            .flat_map(|i| self.sensitivities(problem, i, &of(i).collect::<Vec<_>>()))
-            .collect()
-    }
-
-    fn touches(&self, index: usize, joints: Option<&[usize]>) -> bool {
-        let only = self.actives[index].hypothesis.only_joint();
-        joints.is_none_or(|joints| only.is_none_or(|only| joints.contains(&only)))
-    }
-
-    /// The free coordinates of the effects that act on these joints. Of an effect that acts on all joints but belongs to
-    /// others, only the factors are free: its shape takes long to evaluate and hardly changes.
-    pub fn parameters_at(&self, joints: Option<&[usize]>) -> Vec<(usize, usize)> {
-        let mut all = self.parameters();
-        all.retain(|&(i, c)| {
-            self.touches(i, joints) && (self.is_factor(i, c) || self.belongs(i, joints))
-        });
-        all
+        let of = |i: usize| self.sensitivities(problem, i);
+        (0..self.actives.len()).flat_map(of).collect()
     }
 
     /// Whether a coordinate is a factor.
@@ -68,20 +40,8 @@ impl Fit {
         matches!(self.actives[index].kind(c), CoordinateKind::Factor { .. })
     }
 
-    fn belongs(&self, index: usize, joints: Option<&[usize]>) -> bool {
-        let hypothesis = self.actives[index].hypothesis;
-        let at_joint = matches!(
-            hypothesis.effect.place,
-            PlaceKind::Joint | PlaceKind::TwoJoints
-        );
-        joints.is_none_or(|joints| {
-            joints.len() == self.variance.len()
-                || (at_joint && joints.contains(&hypothesis.place.joint))
-        })
-    }
-
-    /// How the explained effort changes with some coordinates of an active.
-    fn sensitivities(&self, problem: &Problem, index: usize, of: &[usize]) -> Vec<Arc<Column>> {
+    /// How the explained effort changes with the coordinates of an active.
+    fn sensitivities(&self, problem: &Problem, index: usize) -> Vec<Arc<Column>> {
         let active = &self.actives[index];
         let hypothesis = active.hypothesis;
         if hypothesis.is_torque_scale() {
@@ -95,14 +55,14 @@ impl Fit {
         let known = alike.then(|| self.columns(problem, hypothesis, &active.shape()));
         let factors = hypothesis.factors();
         let here = OnceCell::new();
-        let one = |&c: &usize| {
+        let one = |c: usize| {
             let at = factors.iter().position(|&factor| factor == c);
             match (&known, at) {
                 (Some(known), Some(at)) => Arc::clone(&known.factors[at]),
                 _ => Arc::new(self.sensitivity(problem, index, c, &here)),
             }
         };
-        of.iter().map(one).collect()
+        (0..active.coordinates.len()).map(one).collect()
     }
 
     /// The difference quotient of one coordinate. `here` keeps what the effect adds where it is, for its other coordinates.

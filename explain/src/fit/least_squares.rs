@@ -1,9 +1,6 @@
-//! Weighted least squares over signals, by joint, from products that are formed once.
+//! Products of signals, and the solution of normal equations.
 
 use nalgebra::{DMatrix, DVector};
-
-use crate::data::column::Column;
-use crate::data::problem::Problem;
 
 /// Sums are formed in this many parts, which a processor adds at once.
 /// Resolution: changes computing time and rounding.
@@ -69,96 +66,6 @@ pub fn solved(
         solution[i] = within[a] / scale[a];
     }
     Some(solution)
-}
-
-/// The products of a set of columns with each other and with a residual, joint by joint.
-#[derive(Debug, Clone)]
-pub struct Products {
-    /// Per joint: columns with columns.
-    pub gram: Vec<DMatrix<f64>>,
-    /// Per joint: columns with the residual.
-    pub right: Vec<DVector<f64>>,
-    /// Per joint: the residual with itself.
-    pub square: Vec<f64>,
-    /// Per joint: rows that count.
-    pub count: Vec<f64>,
-}
-
-impl Products {
-    /// Over the rows of one track, or of all.
-    pub fn new(
-        problem: &Problem,
-        columns: &[&Column],
-        residual: &[f64],
-        track: Option<usize>,
-    ) -> Self {
-        let rows = track.map_or(0..problem.rows, |r| problem.tracks[r].rows());
-        let p = columns.len();
-        let mut products = Self {
-            gram: Vec::new(),
-            right: Vec::new(),
-            square: Vec::new(),
-            count: Vec::new(),
-        };
-        for j in 0..problem.joints {
-            let own = problem.joint_rows(j);
-            let weight = &problem.weight[own.clone()][rows.clone()];
-            let e = &residual[own][rows.clone()];
-            let mut gram = DMatrix::zeros(p, p);
-            let mut right = DVector::zeros(p);
-            let parts: Vec<Option<&[f64]>> = columns
-                .iter()
-                .map(|c| c.of_joint(j, problem.rows).map(|v| &v[rows.clone()]))
-                .collect();
-            for a in 0..p {
-                let Some(x) = parts[a] else { continue };
-                right[a] = weighted_dot(weight, x, e);
-                for b in a..p {
-                    let Some(y) = parts[b] else { continue };
-                    let product = weighted_dot(weight, x, y);
-                    gram[(a, b)] = product;
-                    gram[(b, a)] = product;
-                }
-            }
-            products.gram.push(gram);
-            products.right.push(right);
-            products.square.push(weighted_dot(weight, e, e));
-            products.count.push(weight.iter().sum());
-        }
-        products
-    }
-
-    /// Sum of squares that `solution` leaves at a joint.
-    pub fn left(&self, joint: usize, solution: &DVector<f64>) -> f64 {
-        let quadratic = (&self.gram[joint] * solution).dot(solution);
-        (self.square[joint] - 2.0 * self.right[joint].dot(solution) + quadratic).max(0.0)
-    }
-
-    /// Sum of squares that `solution` leaves, by joint.
-    pub fn all_left(&self, solution: &DVector<f64>) -> Vec<f64> {
-        (0..self.square.len())
-            .map(|j| self.left(j, solution))
-            .collect()
-    }
-
-    /// The solution for these variances by joint, with `ridge` added to the diagonal and the columns not in
-    /// `used` left at 0. `None` if the columns are not independent even so.
-    pub fn solve(&self, variance: &[f64], ridge: &[f64], used: &[bool]) -> Option<DVector<f64>> {
-        let (normal, right) = self.normal(variance, ridge);
-        solved(&normal, &right, used, 0.0)
-    }
-
-    /// The normal equations for these variances by joint.
-    pub fn normal(&self, variance: &[f64], ridge: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
-        let p = ridge.len();
-        let mut normal = DMatrix::from_diagonal(&DVector::from_row_slice(ridge));
-        let mut right = DVector::zeros(p);
-        for (j, variance) in variance.iter().enumerate() {
-            normal += &self.gram[j] / *variance;
-            right += &self.right[j] / *variance;
-        }
-        (normal, right)
-    }
 }
 
 #[cfg(test)]

@@ -4,12 +4,15 @@
 //! *Numerical Optimization*, 2006, section 10.3; the covariance is Laplace's).
 
 use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::terms::{CoordinateKind, Scale};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
-use crate::fit::body_prior;
+use crate::fit::consistent_bodies::make_consistent;
 use crate::fit::fitted::Fit;
-use crate::fit::refine::bounds;
+use crate::fit::least_squares::solved;
+use crate::physics::active::Active;
+use crate::physics::friction::least;
 
 use super::space::Space;
 
@@ -98,21 +101,6 @@ pub fn refine(
     }
 }
 
-/// Covariance of all coordinates of a fit, in the order of [`Fit::parameters`]. `deviations` as in [`refine`].
-pub fn covariance(problem: &Problem, space: &Space, fit: &Fit, deviations: &[f64]) -> DMatrix<f64> {
-    let jacobian = fit.jacobian(problem);
-    let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
-    let residual = Column {
-        joint: None,
-        values: fit.residual.clone(),
-    };
-    let mut normal = space.products(&columns, &residual).normal;
-    for (i, precision) in precisions(deviations).iter().enumerate() {
-        normal[(i, i)] += precision;
-    }
-    inverse(&normal)
-}
-
 /// Precisions of priors with these standard deviations.
 fn precisions(deviations: &[f64]) -> DVector<f64> {
     let of = |d: &f64| if d.is_finite() { 1.0 / (d * d) } else { 0.0 };
@@ -130,7 +118,7 @@ fn improved(
 ) -> Option<(Fit, f64)> {
     let mut used = vec![true; free.len()];
     let step = loop {
-        let step = solve(&normal, &right, &used)?;
+        let step = solved(&normal, &right, &used, 1e-9)?;
         let mut held = false;
         for (k, &(i, c)) in free.iter().enumerate().filter(|(k, _)| step[*k] != 0.0) {
             let active = &fit.actives[i];
@@ -153,7 +141,7 @@ fn improved(
             let value = &mut actives[i].coordinates[c];
             *value = (*value + share * step[k]).clamp(lower, upper);
         }
-        body_prior::make_consistent(&problem.model, &mut actives);
+        make_consistent(&problem.model, &mut actives);
         let next = Fit::beside(problem, actives, Some(fit));
         let reached = cost(&next);
         if reached < least {
@@ -164,9 +152,28 @@ fn improved(
     None
 }
 
-/// Solves scaled normal equations for the unknowns in use.
-fn solve(normal: &DMatrix<f64>, right: &DVector<f64>, used: &[bool]) -> Option<DVector<f64>> {
-    crate::fit::least_squares::solved(normal, right, used, 1e-9)
+/// Lowest and highest value of a coordinate.
+pub fn bounds(problem: &Problem, active: &Active, c: usize) -> (f64, f64) {
+    match active.kind(c) {
+        CoordinateKind::Factor { minimum, .. } => {
+            (least(problem, active.hypothesis, minimum), f64::INFINITY)
+        }
+        CoordinateKind::Shape {
+            lower,
+            upper,
+            scale,
+            ..
+        } => match scale {
+            Scale::OfEffort => {
+                let largest = problem.largest_effort[active.hypothesis.place.joint];
+                (lower * largest, upper * largest)
+            }
+            Scale::Log | Scale::Linear => (lower, upper),
+        },
+        CoordinateKind::RecordingTime | CoordinateKind::SessionTime => {
+            (f64::NEG_INFINITY, f64::INFINITY)
+        }
+    }
 }
 
 /// The inverse of a positive matrix, scaled to a unit diagonal first.

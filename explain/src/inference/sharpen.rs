@@ -11,13 +11,13 @@ use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::fit::jacobian::step_of;
-use crate::fit::refine::bounds;
 use crate::parallel;
 use crate::physics::active::Hypothesis;
 
 use super::around::Around;
 use super::objective::{Objective, Set};
 use super::prior::Magnitude;
+use super::refine::bounds;
 use super::variants::{self, Given};
 
 /// Most steps. Resolution: bounds the computing time; each halves what is left or more.

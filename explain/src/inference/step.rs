@@ -110,7 +110,12 @@ impl Step<'_> {
 }
 
 /// The numbers of a set, refined.
-fn refined(problem: &Problem, space: &Space, objective: &Objective<'_>, set: &Set) -> Solution {
+pub fn refined(
+    problem: &Problem,
+    space: &Space,
+    objective: &Objective<'_>,
+    set: &Set,
+) -> Solution {
     let factors = objective.factors(set);
     let own = set.iter().map(|&v| &objective.variants[v]);
     let actives = own

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tauscope_dynamics::terms::CoordinateKind;
+use tauscope_dynamics::terms::{CoordinateKind, UNKNOWN};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
@@ -10,8 +10,8 @@ use crate::fit::fitted::Fit;
 use crate::parallel;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::physics::friction::least;
-use crate::propose::base::Base;
 use crate::propose::grid::shapes;
+use crate::propose::{times, wall};
 
 use super::curves::{self, Curve};
 use super::prior::{self, Magnitude};
@@ -160,26 +160,26 @@ pub fn all(
     sizes: &[Magnitude],
 ) -> Vec<Given> {
     let mut all = of_fit(problem, fit, sizes);
-    let jobs: Vec<Hypothesis> = hypotheses.to_vec();
-    let timed = Base::new(problem, fit, hypotheses.len());
     let of = |hypothesis: &Hypothesis| -> Vec<Given> {
-        let at_times = hypothesis.time_kind() != TimeKind::Always || hypothesis.effect.is_surface();
-        let shapes = if at_times {
-            let proposal = timed.propose_in_time(*hypothesis);
-            proposal.map(|p| vec![p.active.shape()]).unwrap_or_default()
+        if *hypothesis.effect == UNKNOWN {
+            return of_curves(problem, fit, hypothesis.place.joint, sizes);
+        }
+        // Times and walls are not on a grid: the data propose them.
+        let (shapes, count) = if hypothesis.effect.is_surface() {
+            (wall::shapes(problem, fit, *hypothesis), 1)
+        } else if hypothesis.time_kind() == TimeKind::Always {
+            let grid = shapes(problem, *hypothesis);
+            let count = grid.len();
+            (grid, count)
         } else {
-            shapes(problem, *hypothesis)
+            (times::shapes(problem, fit, *hypothesis), 1)
         };
-        let count = shapes.len();
         let given = shapes
             .into_iter()
             .map(|shape| at(problem, fit, *hypothesis, shape, count, sizes));
         given.flatten().collect()
     };
-    all.extend(parallel::map(&jobs, of).into_iter().flatten());
-    let joints: Vec<usize> = (0..problem.joints).collect();
-    let curves = |&joint: &usize| of_curves(problem, fit, joint, sizes);
-    all.extend(parallel::map(&joints, curves).into_iter().flatten());
+    all.extend(parallel::map(hypotheses, of).into_iter().flatten());
     all
 }
 

@@ -4,7 +4,7 @@ use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Effect, Layer, PlaceKind, TermSpec};
 
 use crate::data::problem::Problem;
-use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::physics::active::Hypothesis;
 use crate::physics::parameter_units::power_of_effort;
 
 /// The plain friction that an effect is or contains, and the effect's parameters that are proportional to it.
@@ -81,27 +81,6 @@ pub fn in_recorded_units(term: &TermSpec, model: &Model, units_nm: &[f64]) -> Te
         }
     }
     term
-}
-
-/// The coordinates of an effect, and of friction that changes with time those with the friction that the twin has already:
-/// friction that begins to grow has grown from what was there, and not from nothing.
-pub fn with_known(problem: &Problem, active: &Active) -> Vec<f64> {
-    let effect = active.hypothesis.effect;
-    let known = &problem.known_friction[active.hypothesis.place.joint];
-    let changes = effect.time() == TimeKind::Step || effect.traits.drifts.is_some();
-    // Another simulation has any friction: how much, nobody knows.
-    let contained = contained(effect).filter(|_| changes && !problem.is_foreign);
-    let known = contained.and_then(|(plain, numbers)| Some((known.get(plain.name)?, numbers)));
-    let Some((known, numbers)) = known else {
-        return active.coordinates.clone();
-    };
-    let mut parameters = active.parameters();
-    for (value, parameter) in parameters.iter_mut().zip(effect.parameters) {
-        if numbers.contains(&parameter.name) {
-            *value += known;
-        }
-    }
-    (effect.to_coordinates)(&parameters)
 }
 
 /// Lowest value of a hypothesis' factor. Friction that the twin has already may be reduced to zero.

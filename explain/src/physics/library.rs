@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{EFFECTS, Effect, PlaceKind};
+use tauscope_dynamics::terms::{EFFECTS, Effect, PlaceKind, UNKNOWN};
 
 use crate::physics::active::{Hypothesis, Whereabouts};
 
@@ -13,8 +13,25 @@ pub fn any_plain_friction() -> BTreeMap<&'static str, f64> {
     plain.map(|effect| (effect.name, f64::INFINITY)).collect()
 }
 
-/// The hypotheses that describe a link's body without naming a cause. They exist for each moving link that has a body in
-/// the URDF, except for the last link, where every additional body is a payload.
+/// The hypotheses that describe without naming a cause: a curve at each joint, and where `bodies` are known, each link's
+/// body.
+pub fn unnamed(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Vec<Hypothesis> {
+    let curve = |joint: usize| Hypothesis {
+        effect: &UNKNOWN,
+        place: Whereabouts {
+            joint,
+            ..Whereabouts::default()
+        },
+    };
+    let mut all: Vec<Hypothesis> = (0..model.dof()).map(curve).collect();
+    if bodies {
+        all.extend(unnamed_bodies(model, without));
+    }
+    all
+}
+
+/// Unnamed bodies exist for each moving link that has a body in the URDF, except for the last link, where every additional
+/// body is a payload.
 pub fn unnamed_bodies(model: &Model, without: &BTreeSet<String>) -> Vec<Hypothesis> {
     let describes =
         |effect: &&&Effect| effect.traits.describes_only && effect.place == PlaceKind::Link;

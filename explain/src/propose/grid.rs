@@ -6,7 +6,7 @@ use crate::data::problem::Problem;
 use crate::physics::active::Hypothesis;
 
 /// Most grid steps of a shape that all joints share: its columns cost the most, and the fit refines the shape later.
-/// Tuned: by hand, for what it costs in time; not swept.
+/// Resolution: changes the computing time.
 const MOST_STEPS_OF_ALL: usize = 12;
 
 /// The grid of a hypothesis' shapes, with factors 0.
@@ -54,18 +54,4 @@ pub fn shapes(problem: &Problem, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
         grid = grid.iter().flat_map(longer).collect();
     }
     grid
-}
-
-/// Index of a hypothesis' shape, if it has exactly one.
-pub fn shape_index(hypothesis: Hypothesis) -> Option<usize> {
-    let coordinates = hypothesis.effect.coordinates.iter().enumerate();
-    let mut shapes = coordinates.filter(|(_, c)| matches!(c.kind, CoordinateKind::Shape { .. }));
-    let (first, _) = shapes.next()?;
-    shapes.next().is_none().then_some(first)
-}
-
-/// Index and value of the largest gain.
-pub fn best_of(gains: impl Iterator<Item = Option<f64>>) -> Option<(usize, f64)> {
-    let known = gains.enumerate().filter_map(|(i, gain)| Some((i, gain?)));
-    known.max_by(|(_, a), (_, b)| a.total_cmp(b))
 }

@@ -1,16 +1,15 @@
 //! Intervals of a log that are searched for an effect that acts for a while.
 
-/// Steps per recording on which change points are searched, and intervals at least. Their number's logarithm is the
-/// penalty for the choice of one time.
-/// Tuned: by hand, for what it costs in time; not swept.
+/// Steps per recording on which changes are searched, and intervals at least.
+/// Resolution: times are refined afterwards.
 pub const STEPS: usize = 100;
 /// Of a recording with more than [`STEPS`] steps, intervals of more than this many steps are searched on twice the step,
 /// so that the shortest are found in a log of any length and the work grows no faster than the log.
 /// Resolution: the ends of an interval are searched to within a twentieth of its length.
 const FINE_STEPS: usize = 40;
 /// Intervals whose two ends differ by at most this many steps in sum count as the same.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const SAME_STEPS: usize = 4;
+/// Resolution: refinement makes one time of both.
+pub const SAME_STEPS: usize = 4;
 
 /// An interval in steps, and on how many of them at once its ends were searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,132 +1,99 @@
 //! Where a wall could be: from the force at the end of the arm that explains the residual.
 
 use nalgebra::{Matrix3, Point3, Vector3};
+use tauscope_dynamics::kinematic_tree::moving_link;
 use tauscope_dynamics::{Data, forward_kinematics, link_jacobian, link_pose};
 
-use crate::fit::fitted::LEAST_VARIANCE;
+use crate::data::problem::Problem;
+use crate::fit::fitted::{Fit, LEAST_VARIANCE};
 use crate::physics::active::Hypothesis;
-use crate::propose::base::{Base, Proposal};
-use tauscope_dynamics::kinematic_tree::moving_link;
 
 /// A sample belongs to a contact if the best force there reduces the sum of squares over the variance by this much.
-/// White noise alone exceeds it in one of 700 000 samples (chi-square, three degrees of freedom).
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Statistical: white noise exceeds it in one of 700 000 samples (chi-square, three degrees of freedom).
 const EVIDENT: f64 = 30.0;
-/// Contact samples that a wall needs.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const LEAST_SAMPLES: usize = 8;
 /// Quantiles of the depth of the contact samples at which the wall's surface is tried.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const SURFACES: [f64; 4] = [0.0, 0.05, 0.2, 0.4];
-/// The surface lies this much before the quantile \[m\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-const BEFORE_M: f64 = 0.005;
-/// Rounds of improving the wall's normal.
-/// Tuned: by hand, for what it costs in time; not swept.
-const ROUNDS: usize = 3;
-/// A force agrees with the normal if the cosine of the angle between them is above this.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const AGREES: f64 = 0.7;
+/// Resolution: the surface is refined afterwards.
+const SURFACES: [f64; 3] = [0.0, 0.1, 0.4];
 /// Added to the diagonal of a sample's normal equations, as a share of their trace: the arm does not feel a force in
 /// every direction.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Resolution: far below what the arm feels.
 const RIDGE: f64 = 1e-3;
 /// A shorter sum of forces has no direction \[N\].
 /// Resolution: guards a division by zero; far below any measured force.
 const LEAST_FORCE_N: f64 = 1e-9;
 
-impl Base<'_> {
-    /// The best wall: its normal is the direction of the force, its surface is where the force begins.
-    ///
-    /// Contact samples are found in two ways. Forces that stand out of the residual show a wall that the arm touches
-    /// now and then. Forces that stand out of the white noise show one that it leans on nearly all the time.
-    pub fn propose_wall(&self, hypothesis: Hypothesis) -> Option<Proposal> {
-        let noise = self.problem.white_noise.iter();
-        let noise: Vec<f64> = noise
-            .map(|sigma| (sigma * sigma).max(LEAST_VARIANCE))
-            .collect();
-        let [left, noise] =
-            [&self.fit.variance, &noise].map(|variance| self.wall_of(hypothesis, variance));
-        let gain = |wall: &Option<(f64, [f64; 4])>| wall.map_or(f64::NEG_INFINITY, |wall| wall.0);
-        let best = if gain(&noise) > gain(&left) {
-            noise
-        } else {
-            left
-        };
-        self.propose_at(hypothesis, &best?.1)
-    }
+/// Walls to try, with their stiffness at zero: the normal is the direction of the force, the surface is where it begins.
+///
+/// Contact samples are found in two ways. Forces that stand out of the residual show a wall that the arm touches
+/// now and then. Forces that stand out of the white noise show one that it leans on nearly all the time.
+pub fn shapes(problem: &Problem, fit: &Fit, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
+    let noise = problem.white_noise.iter();
+    let noise: Vec<f64> = noise
+        .map(|sigma| (sigma * sigma).max(LEAST_VARIANCE))
+        .collect();
+    let link = moving_link(&problem.model, hypothesis.place.link);
+    let of = |variance: &Vec<f64>| walls(&contacts(problem, fit, link, variance));
+    [&fit.variance, &noise].into_iter().flat_map(of).collect()
+}
 
-    /// Gain and shape of the best wall, from the samples at which a force stands out of these variances of the joints.
-    fn wall_of(&self, hypothesis: Hypothesis, variance: &[f64]) -> Option<(f64, [f64; 4])> {
-        let link = moving_link(&self.problem.model, hypothesis.place.link);
-        let contacts = self.contacts(link, variance);
-        if contacts.len() < LEAST_SAMPLES {
-            return None;
-        }
-        let total: Vector3<f64> = contacts.iter().map(|(_, force)| force).sum();
-        let mut direction = -total.try_normalize(LEAST_FORCE_N)?;
-        let mut best: Option<(f64, [f64; 4])> = None;
-        // The force of a sample is uncertain in directions that the arm cannot feel, so only those that agree count.
-        for _ in 0..ROUNDS {
-            let agreeing: Vector3<f64> = contacts
-                .iter()
-                .filter(|(_, force)| -force.dot(&direction) > AGREES * force.norm())
-                .map(|(_, force)| force)
-                .sum();
-            direction = -agreeing.try_normalize(LEAST_FORCE_N)?;
-            let mut depths: Vec<f64> = contacts
-                .iter()
-                .map(|(point, _)| direction.dot(&point.coords))
-                .collect();
-            depths.sort_by(f64::total_cmp);
-            for quantile in SURFACES {
-                let offset = depths[(quantile * (depths.len() - 1) as f64) as usize] - BEFORE_M;
-                let azimuth = direction.y.atan2(direction.x);
-                let elevation = direction.z.clamp(-1.0, 1.0).asin();
-                let shape = [0.0, azimuth, elevation, offset];
-                if let Some(gain) = self.first_order_score_at(hypothesis, &shape)
-                    && best.is_none_or(|(most, _)| gain > most)
-                {
-                    best = Some((gain, shape));
-                }
+/// Walls at the contact samples of one link.
+fn walls(contacts: &[(Point3<f64>, Vector3<f64>)]) -> Vec<Vec<f64>> {
+    let along = |total: Vector3<f64>| Some(-total.try_normalize(LEAST_FORCE_N)?);
+    let Some(mean) = along(contacts.iter().map(|(_, force)| force).sum()) else {
+        return Vec::new();
+    };
+    // Forces are uncertain in directions that the arm cannot feel: those against the wall say nothing of it.
+    let agreeing = contacts.iter().filter(|(_, force)| force.dot(&mean) < 0.0);
+    let Some(direction) = along(agreeing.map(|(_, force)| force).sum()) else {
+        return Vec::new();
+    };
+    let depth = |(point, _): &(Point3<f64>, Vector3<f64>)| direction.dot(&point.coords);
+    let mut depths: Vec<f64> = contacts.iter().map(depth).collect();
+    depths.sort_by(f64::total_cmp);
+    let azimuth = direction.y.atan2(direction.x);
+    let elevation = direction.z.clamp(-1.0, 1.0).asin();
+    let surface = |quantile: f64| depths[(quantile * (depths.len() - 1) as f64) as usize];
+    SURFACES
+        .map(|quantile| vec![0.0, azimuth, elevation, surface(quantile)])
+        .into()
+}
+
+/// Samples at which a force on a link stands out of `variance`: position of the link's frame \[m\] and force \[N\].
+fn contacts(
+    problem: &Problem,
+    fit: &Fit,
+    link: usize,
+    variance: &[f64],
+) -> Vec<(Point3<f64>, Vector3<f64>)> {
+    let n = problem.joints;
+    let mut data = Data::new(&problem.model);
+    let mut found = Vec::new();
+    for track in &problem.tracks {
+        for (row, &k) in track.rows().zip(&track.compared) {
+            let position = &track.track.position[k * n..(k + 1) * n];
+            forward_kinematics(&problem.model, &mut data, position);
+            let point = link_pose(&problem.model, &data, link).translation.vector;
+            let jacobian = link_jacobian(&problem.model, &mut data, link);
+            let mut normal = Matrix3::zeros();
+            let mut right = Vector3::zeros();
+            for j in 0..n {
+                let at = j * problem.rows + row;
+                let weight = 1.0 / variance[j];
+                let column = Vector3::new(jacobian[(0, j)], jacobian[(1, j)], jacobian[(2, j)]);
+                normal += weight * column * column.transpose();
+                right -= weight * fit.residual[at] * column;
+            }
+            let ridge = RIDGE * normal.trace();
+            let Some(factor) = (normal + Matrix3::identity() * ridge).cholesky() else {
+                continue;
+            };
+            let force: Vector3<f64> = factor.solve(&right);
+            if right.dot(&force) > EVIDENT {
+                found.push((Point3::from(point), force));
             }
         }
-        best
     }
-
-    /// Samples at which a force on a link stands out of `variance`: position of the link's frame \[m\] and force \[N\].
-    fn contacts(&self, link: usize, variance: &[f64]) -> Vec<(Point3<f64>, Vector3<f64>)> {
-        let problem = self.problem;
-        let n = problem.joints;
-        let mut data = Data::new(&problem.model);
-        let mut found = Vec::new();
-        for track in &problem.tracks {
-            for (row, &k) in track.rows().zip(&track.compared) {
-                let position = &track.track.position[k * n..(k + 1) * n];
-                forward_kinematics(&problem.model, &mut data, position);
-                let point = link_pose(&problem.model, &data, link).translation.vector;
-                let jacobian = link_jacobian(&problem.model, &mut data, link);
-                let mut normal = Matrix3::zeros();
-                let mut right = Vector3::zeros();
-                for j in 0..n {
-                    let at = j * problem.rows + row;
-                    let weight = 1.0 / variance[j];
-                    let column = Vector3::new(jacobian[(0, j)], jacobian[(1, j)], jacobian[(2, j)]);
-                    normal += weight * column * column.transpose();
-                    right -= weight * self.fit.residual[at] * column;
-                }
-                let ridge = RIDGE * normal.trace();
-                let Some(factor) = (normal + Matrix3::identity() * ridge).cholesky() else {
-                    continue;
-                };
-                let force: Vector3<f64> = factor.solve(&right);
-                if right.dot(&force) > EVIDENT {
-                    found.push((Point3::from(point), force));
-                }
-            }
-        }
-        found
-    }
+    found
 }
 
 #[cfg(test)]
@@ -134,11 +101,9 @@ mod tests {
     use tauscope_dynamics::Model;
     use tauscope_dynamics::terms::effect;
 
-    use crate::fit::fitted::Fit;
     use crate::fixture::{URDF, problem, recording};
+    use crate::inference::estimated;
     use crate::physics::active::{Hypothesis, Whereabouts};
-    use crate::physics::plausible::plausible;
-    use crate::propose::base::Base;
     use tauscope_dynamics::kinematic_tree::{bearing, moving_link, reach_m};
 
     /// Stiffness \[N/m\] and offset \[m\] of the wall that is found where the arm presses on a floor of 800 N/m at
@@ -171,12 +136,8 @@ mod tests {
             term.act(&at, effort);
         };
         let data = problem(&model, &[recording(&model, 3, press)]);
-        let nothing = Fit::new(&data, Vec::new());
-        let base = Base::new(&data, &nothing, 40);
-        let proposal = base.propose_wall(wall).unwrap();
-        assert!(plausible(&data, &proposal.active));
-        let parameters =
-            nothing.with(&data, proposal.active).refined(&data).actives[0].parameters();
+        let found = estimated(&data, Vec::new(), &[wall], true);
+        let parameters = found.fit.actives[0].parameters();
         (parameters[0], parameters[4])
     }
 

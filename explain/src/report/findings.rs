@@ -18,7 +18,7 @@ use tauscope_dynamics::terms::PlaceKind;
 use crate::context::Context;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
-use crate::fit::interval::{half_width_95, parameter_deviations};
+use crate::fit::interval::{HALF_WIDTH_95, parameter_deviations};
 use crate::inference::Inferred;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::physics::friction::least;
@@ -195,7 +195,7 @@ fn numbers(
         // The time of a change between two recordings is not known any better.
         let vague = parameter.name.starts_with("change_time") && *deviation > VAGUE_S;
         if deviation.is_finite() && !vague {
-            let half = half_width_95(problem) * deviation;
+            let half = HALF_WIDTH_95 * deviation;
             let least = least(problem, active.hypothesis, parameter.minimum);
             let low = (value - half).max(least);
             intervals.insert(parameter.name.to_owned(), [low, value + half]);

@@ -9,7 +9,6 @@ use crate::fit::fitted::{Fit, LEAST_VARIANCE};
 use crate::physics::active::{Active, in_order};
 use crate::physics::carrier::is_on_carrier;
 use crate::read::recording::Recording;
-use crate::report::handed_out::not_carried;
 use crate::report::schema::{JointPicture, RecordingPicture};
 
 /// Cutoffs that are tried for the motion of a prediction, as shares of the fit's cutoff. The best on the fitted
@@ -171,13 +170,17 @@ impl Context<'_> {
         Ok(errors.rms())
     }
 
-    /// Runs the corrected twin over the hold-out recordings.
-    pub fn proof(&self, problem: &Problem, scaled: &Fit, found: &Fit) -> Result<Proof, TermError> {
+    /// Runs the corrected twin over the hold-out recordings; the joints `kept` have the twin as it was.
+    pub fn proof(
+        &self,
+        problem: &Problem,
+        [scaled, found]: [&Fit; 2],
+        kept: Vec<usize>,
+    ) -> Result<Proof, TermError> {
         let n = self.unit_nm.len();
         let names: Vec<&str> = self.input.model.joint_names().collect();
         let smoothing = self.best_smoothing(problem, found)?;
         let (mut before, mut after) = (Errors::new(n), Errors::new(n));
-        let kept = not_carried(problem, scaled, found);
         let (mut predictions, mut pictures) = (Vec::new(), Vec::new());
         let held = self.input.holdout.iter().map(|recording| (recording, true));
         let of_fit = self.input.fit.iter().map(|recording| (recording, false));
