@@ -5,12 +5,11 @@
 //! chapter XIV). Measured effort and every regressor column pass through one zero-phase low-pass (Eilers, "A Perfect
 //! Smoother", *Analytical Chemistry* 75, 2003), so that filtering biases no parameter; identification of robots calls
 //! this the parallel filter (Khalil and Dombre, *Modeling, Identification and Control of Robots*, 2002, chapter 12).
-//! Rows are thinned to twice the cutoff, standstills and gaps are masked, and the noise is measured: its variance from
-//! fourth differences, its correlation as an effective sample size.
+//! Rows are thinned to twice the cutoff, standstills and gaps are masked, and the variance of the white noise is
+//! measured from fourth differences.
 
 pub mod column;
 mod compared;
-pub mod effective_samples;
 pub mod efforts;
 pub mod memo;
 pub mod noise;

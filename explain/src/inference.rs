@@ -242,11 +242,7 @@ fn follow(
 /// The set with only one new effect whose effort is not linear in its numbers and that several joints feel, and whether any
 /// was left for later: such effects imitate each other until the numbers of one are refined.
 fn first_that_bends(objective: &Objective<'_>, own: &Set, found: Set) -> (Set, bool) {
-    let bends = |v: &usize| {
-        let hypothesis = objective.variants[*v].hypothesis;
-        hypothesis.only_joint().is_none()
-            && (!hypothesis.is_linear() || hypothesis.effect.traits.bends)
-    };
+    let bends = |v: &usize| objective.variants[*v].bends();
     let new: Vec<usize> = found
         .iter()
         .copied()
@@ -331,12 +327,16 @@ fn unpredictive(
     efforts: &[Magnitude],
     residuals: &[Vec<DVector<f64>>],
 ) -> Vec<usize> {
-    let lasts = |active: &&Active| {
-        active.hypothesis.lasts() && !active.hypothesis.is_torque_scale()
-    };
+    let lasts =
+        |active: &&Active| active.hypothesis.lasts() && !active.hypothesis.is_torque_scale();
     let (lasting, others): (Vec<&Active>, Vec<&Active>) = fit.actives.iter().partition(lasts);
     let feels = |joint: usize| {
-        let only = |active: &&&Active| active.hypothesis.only_joint().is_none_or(|own| own == joint);
+        let only = |active: &&&Active| {
+            active
+                .hypothesis
+                .only_joint()
+                .is_none_or(|own| own == joint)
+        };
         lasting.iter().any(|active| only(&active))
     };
     let others = others.into_iter().cloned().collect();
@@ -344,7 +344,8 @@ fn unpredictive(
     let Some(without) = left_out(problem, space, &without, efforts) else {
         return Vec::new();
     };
-    let square = |of_joint: &[DVector<f64>]| of_joint.iter().map(DVector::norm_squared).sum::<f64>();
+    let square =
+        |of_joint: &[DVector<f64>]| of_joint.iter().map(DVector::norm_squared).sum::<f64>();
     let joints = (0..problem.joints).filter(|joint| feels(*joint));
     joints
         .filter(|&joint| square(&residuals[joint]) >= square(&without[joint]))

@@ -6,10 +6,6 @@ use super::payload::{BODY_COORDINATES, BODY_PARAMETERS, inertia, parameters};
 use super::{Effect, Excitation, Family, Layer, PlaceKind, Simulated, Traits, Words};
 use crate::{Inertia, Model};
 
-/// No more than this share of what the last joint carries is absent.
-/// Physical: the mass of the URDF and the estimate may both be off by a tenth.
-const MOST_ABSENT: f64 = 1.2;
-
 /// Of less than this share no tool is missing: the bodies of a URDF are off by as much.
 /// Physical: a fifth; drawings and weighed arms differ by a twentieth to a tenth.
 pub const LEAST_ABSENT: f64 = 0.2;
@@ -40,8 +36,6 @@ pub static EFFECT: Effect = Effect {
     to_parameters: |c| parameters(&array(c)).to_vec(),
     to_coordinates: |p| inertia(&array(p)).parameters().to_vec(),
     simpler: None,
-    // More than there is cannot be absent.
-    limit: Some(|site, x| share_of_carried(site.model, site.link, x[0]) <= MOST_ABSENT),
     excitation: Excitation::Poses,
     simulated: Simulated::Model,
     // What can be taken off depends on the URDF.

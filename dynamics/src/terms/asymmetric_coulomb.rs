@@ -6,13 +6,6 @@ use super::{
     Traits, Words, sign,
 };
 
-/// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset.
-/// Tuned: not swept.
-const LEAST_SYMMETRY: f64 = 0.2;
-/// And at most this share: what looks less lopsided is friction and a small offset, which every sensor has.
-/// Physical: a tenth is what bodies that are a few per cent off make of plain friction.
-const MOST_SYMMETRY: f64 = 0.9;
-
 /// Effort F+ max(sgn(qd), 0) + F- min(sgn(qd), 0).
 pub(super) static EFFECT: Effect = Effect {
     name: "asymmetric_coulomb",
@@ -40,10 +33,6 @@ pub(super) static EFFECT: Effect = Effect {
     simpler: Some(Simpler {
         effect: &super::coulomb_friction::EFFECT,
         numbers: &["coulomb_positive_nm", "coulomb_negative_nm"],
-    }),
-    limit: Some(|_, x| {
-        let (less, more) = (x[0].min(x[1]), x[0].max(x[1]));
-        (LEAST_SYMMETRY * more..=MOST_SYMMETRY * more).contains(&less)
     }),
     excitation: Excitation::Speeds,
     simulated: Simulated::Joint,

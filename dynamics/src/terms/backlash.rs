@@ -52,7 +52,6 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::rotor_inertia::EFFECT,
         numbers: &["rotor_inertia_kgm2"],
     }),
-    limit: None,
     excitation: Excitation::Fast,
     simulated: Simulated::Transmission(|x, inertia| Compliance {
         stiffness: inertia * CONTACT_FREQUENCY * CONTACT_FREQUENCY,

@@ -35,7 +35,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: None,
     excitation: Excitation::Poses,
     simulated: Simulated::Model,
     concealed: Some(|draw| {

@@ -38,7 +38,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: None,
     excitation: Excitation::Poses,
     simulated: Simulated::No(
         "simulate that recording by a scenario of its own that has a `base_tilt`",

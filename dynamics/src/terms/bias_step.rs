@@ -38,7 +38,6 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::torque_bias::EFFECT,
         numbers: &["bias_after_nm", "bias_before_nm"],
     }),
-    limit: None,
     excitation: Excitation::WholeRange,
     simulated: Simulated::Record,
     concealed: None,

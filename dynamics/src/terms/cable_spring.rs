@@ -5,23 +5,10 @@ use super::{
     Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
     Words,
 };
-use crate::Limits;
 
 /// Softer than this it is no spring \[N m/rad\].
 /// Physical: far below any spring; it only keeps the rest angle finite.
 const LEAST_STIFFNESS: f64 = 1e-9;
-
-/// A spring hangs loose within the range of its joint or this many times its width beside it: farther off it is a constant
-/// effort. Where the URDF knows no range it is taken to be a turn either way.
-/// Tuned: not swept.
-const LOOSE_BESIDE: f64 = 1.0;
-
-fn hangs_loose_near(limits: &Limits, rest: f64) -> bool {
-    let turn = std::f64::consts::TAU;
-    let (lower, upper) = (limits.lower.unwrap_or(-turn), limits.upper.unwrap_or(turn));
-    let beside = LOOSE_BESIDE * (upper - lower);
-    (lower - beside..=upper + beside).contains(&rest)
-}
 
 /// Effort k (q - q0), searched as k q plus a constant.
 pub(super) static EFFECT: Effect = Effect {
@@ -51,10 +38,6 @@ pub(super) static EFFECT: Effect = Effect {
     },
     to_coordinates: |p| vec![p[0], -p[0] * p[1]],
     simpler: None,
-    limit: Some(|site, x| {
-        let limits = &site.model.joints()[site.joint].limits;
-        hangs_loose_near(limits, (EFFECT.to_parameters)(x)[1])
-    }),
     excitation: Excitation::WholeRange,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

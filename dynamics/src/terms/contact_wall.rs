@@ -9,12 +9,8 @@ use super::{
     Coordinate, Draw, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
     Scale, Simulated, Site, Term, Traits, Words,
 };
-use crate::kinematic_tree::{moving_link, reach_m};
 use crate::{Data, forward_kinematics, link_pose};
 
-/// A wall is at least so stiff, and within reach: what is softer or farther is a force that is always there.
-/// Tuned: not swept.
-const SOFTEST_N_PER_M: f64 = 5.0;
 /// The wall's range that is searched \[m\]. Physical: farther than any arm on a fixed base reaches.
 const RANGE_M: f64 = 10.0;
 /// A wall is drawn so that the arm is in it for a fifth of the time.
@@ -81,10 +77,6 @@ pub(super) static EFFECT: Effect = Effect {
         vec![p[0], azimuth, elevation, p[4]]
     },
     simpler: None,
-    limit: Some(|site, x| {
-        let link = moving_link(site.model, site.link);
-        x[0] >= SOFTEST_N_PER_M && x[3].abs() < reach_m(site.model, link)
-    }),
     excitation: Excitation::Poses,
     simulated: Simulated::Load,
     concealed: Some(|draw| {

@@ -33,7 +33,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: |c| vec![c[0].hypot(c[1]), (0.0 - c[1]).atan2(c[0])],
     to_coordinates: |p| vec![p[0] * p[1].cos(), -p[0] * p[1].sin()],
     simpler: None,
-    limit: None,
     excitation: Excitation::WholeRange,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

@@ -36,7 +36,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: wave::to_parameters,
     to_coordinates: wave::to_coordinates,
     simpler: None,
-    limit: Some(|_, x| wave::closes(x[2])),
     excitation: Excitation::Speeds,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

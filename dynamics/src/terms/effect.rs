@@ -38,8 +38,6 @@ pub struct Effect {
     pub to_coordinates: fn(&[f64]) -> Vec<f64>,
     /// The simpler effect that it contains; `None` if it contains none.
     pub simpler: Option<Simpler>,
-    /// Whether a robot may have it at a site with these coordinates; `None` if the minima of its parameters are all there is to it.
-    pub limit: Option<fn(&Site<'_>, &[f64]) -> bool>,
     /// The motion that shows it.
     pub excitation: Excitation,
     /// How a simulated arm suffers it.
@@ -72,11 +70,6 @@ impl Effect {
             (_, 0) => Time::EveryRecording,
             _ => Time::Once,
         }
-    }
-
-    /// Whether a robot may have it at a site with these coordinates, as far as its `limit` goes.
-    pub fn is_plausible(&self, site: &Site<'_>, coordinates: &[f64]) -> bool {
-        self.limit.is_none_or(|limit| limit(site, coordinates))
     }
 
     /// Whether it is something stiff in space that the arm meets.

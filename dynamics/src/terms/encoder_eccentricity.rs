@@ -10,14 +10,7 @@ use super::{
     Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
     Scale, Simulated, Term, Traits, Words, wave,
 };
-use crate::JointKind;
 
-/// A larger error is none of an encoder \[rad\].
-/// Physical: at arm's length the arm would miss by a hand's width, which nobody overlooks.
-const LARGEST_RAD: f64 = 0.2;
-/// A smaller one is how encoders are made and mounted \[rad\].
-/// Physical: a disc of 50 mm that is off its axis by 0.1 mm.
-const LEAST_RAD: f64 = 0.004;
 /// The joint stands at the recorded position q plus A sin(n q + φ), and moves accordingly: the effort of the robot there less
 /// that of the recorded motion. To first order linear in the factors of sin n q and cos n q.
 pub(super) static EFFECT: Effect = Effect {
@@ -48,11 +41,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: wave::to_parameters,
     to_coordinates: wave::to_coordinates,
     simpler: None,
-    limit: Some(|site, x| {
-        let turns = site.model.joints()[site.joint].kind != JointKind::Prismatic;
-        let closes = wave::closes(x[2]);
-        turns && closes && (LEAST_RAD..=LARGEST_RAD).contains(&x[0].hypot(x[1]))
-    }),
     excitation: Excitation::Poses,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

@@ -11,10 +11,6 @@ use super::{
 use crate::kinematics::link_origin;
 use crate::{Data, Model, forward_kinematics, link_jacobian};
 
-/// A stronger force is none that pushes a robot \[N\]: it hardly acts on the joints that would feel a weaker one elsewhere.
-/// Physical: several times what collaborative robots may exert on a person (ISO/TS 15066, annex A).
-const STRONGEST_N: f64 = 1000.0;
-
 /// A constant force on the origin of a link, along the world's axes: effort -Jᵀ F while it lasts.
 pub(super) static EFFECT: Effect = Effect {
     name: "external_push",
@@ -57,7 +53,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: Some(|_, x| x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N),
     excitation: Excitation::Poses,
     simulated: Simulated::Load,
     concealed: Some(|draw| {

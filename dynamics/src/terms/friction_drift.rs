@@ -39,7 +39,6 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::coulomb_friction::EFFECT,
         numbers: &["coulomb_start_nm"],
     }),
-    limit: None,
     excitation: Excitation::Speeds,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

@@ -6,13 +6,6 @@ use super::{
     Simpler, Simulated, Traits, Words, sign,
 };
 
-/// A change of friction smaller than this share of it is what friction does from day to day.
-/// Tuned: not swept.
-const LEAST_STEP: f64 = 0.3;
-/// Friction that changes leaves at least this share of what it was: none comes from nothing or goes for good.
-/// Tuned: not swept.
-const LEAST_LEFT: f64 = 0.1;
-
 /// Effort F sgn(qd), F being one value before a time of the session and another from then on.
 pub(super) static EFFECT: Effect = Effect {
     name: "friction_step",
@@ -45,10 +38,6 @@ pub(super) static EFFECT: Effect = Effect {
     simpler: Some(Simpler {
         effect: &super::coulomb_friction::EFFECT,
         numbers: &["coulomb_after_nm", "coulomb_before_nm"],
-    }),
-    limit: Some(|_, x| {
-        let (less, more) = (x[0].min(x[1]), x[0].max(x[1]));
-        more - less > LEAST_STEP * more && less >= LEAST_LEFT * more
     }),
     excitation: Excitation::Speeds,
     simulated: Simulated::Joint,

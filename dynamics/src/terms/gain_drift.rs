@@ -8,10 +8,6 @@ use super::{
     Simpler, Simulated, Term, Traits, Words,
 };
 
-/// A gain that changes more within a session is no torque constant.
-/// Physical: by 200 K magnets lose a fifth.
-const MOST: f64 = 0.3;
-
 /// Recorded effort: 1 + g + r t times the true one, t being the time since the start of the session.
 pub(super) static EFFECT: Effect = Effect {
     name: "gain_drift",
@@ -42,7 +38,6 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::torque_gain::EFFECT,
         numbers: &["gain_excess_start"],
     }),
-    limit: Some(|_, x| x[0].abs() <= MOST),
     excitation: Excitation::Poses,
     simulated: Simulated::Record,
     concealed: Some(|draw| {

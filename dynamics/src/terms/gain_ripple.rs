@@ -9,10 +9,6 @@ use super::{
     Scale, Simulated, Term, Traits, Words, wave,
 };
 
-/// A torque constant varies by less than this share.
-/// Physical: a motor that lost half its torque at some angle would not be used.
-const MOST: f64 = 0.5;
-
 /// Recorded effort: 1 + A sin(n q + φ) times the true one, searched as the factors of sin n q and cos n q.
 pub(super) static EFFECT: Effect = Effect {
     name: "gain_ripple",
@@ -42,10 +38,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: wave::to_parameters,
     to_coordinates: wave::to_coordinates,
     simpler: None,
-    limit: Some(|_, x| {
-        let closes = wave::closes(x[2]);
-        closes && x[0].hypot(x[1]) <= MOST
-    }),
     excitation: Excitation::Poses,
     simulated: Simulated::Record,
     concealed: Some(|draw| {

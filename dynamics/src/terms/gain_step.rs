@@ -8,10 +8,6 @@ use super::{
     PlaceKind, Simpler, Simulated, Term, Traits, Words,
 };
 
-/// A smaller jump is told by a gain that drifts as well \[share of the effort\].
-/// Tuned: not swept.
-const LEAST_STEP: f64 = 0.02;
-
 /// Recorded effort: one gain times the true one before a time of the session, and another from then on.
 pub(super) static EFFECT: Effect = Effect {
     name: "gain_step",
@@ -44,7 +40,6 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::torque_gain::EFFECT,
         numbers: &["gain_excess_after", "gain_excess_before"],
     }),
-    limit: Some(|_, x| (x[1] - x[0]).abs() > LEAST_STEP),
     excitation: Excitation::Poses,
     simulated: Simulated::Record,
     concealed: None,

@@ -8,10 +8,6 @@ use super::{
     Traits, Words, sign,
 };
 
-/// Below this share of the other direction's, one direction has no loss of its own: an effort that only looks so.
-/// Tuned: as the symmetry of Coulomb friction by direction; not swept.
-const LEAST_SHARE: f64 = 0.02;
-
 /// Effort μd max(τ sgn(qd), 0) sgn(qd) while the motor drives the load, μb max(-τ sgn(qd), 0) sgn(qd) while the load
 /// drives the motor; τ is the rigid body's effort without friction.
 pub(super) static EFFECT: Effect = Effect {
@@ -42,7 +38,6 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::load_dependent_friction::EFFECT,
         numbers: &["driving_coefficient", "backdriving_coefficient"],
     }),
-    limit: Some(|_, x| x[0].min(x[1]) >= LEAST_SHARE * x[0].max(x[1])),
     excitation: Excitation::Speeds,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

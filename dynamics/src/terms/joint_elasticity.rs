@@ -13,10 +13,6 @@ use super::{
 /// Tuned: a lightly damped gear; not swept.
 const DAMPING_RATIO: f64 = 0.05;
 
-/// A rotor on the spring of its gear resonates at least this fast against a link that stands still.
-/// Tuned: 3 Hz, not swept.
-const SOFTEST_RAD_S: f64 = 3.0 * std::f64::consts::TAU;
-
 /// A spring between rotor and link, T = -K δ - D δ̇ with the damping D = 2 ζ √(K M), ζ = 0.05, and a rotor of
 /// inertia J. The encoder is on the rotor; the link starts at rest against it.
 pub(super) static EFFECT: Effect = Effect {
@@ -46,7 +42,6 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::rotor_inertia::EFFECT,
         numbers: &["rotor_inertia_kgm2"],
     }),
-    limit: Some(|_, x| (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S),
     excitation: Excitation::Fast,
     simulated: Simulated::Transmission(|x, inertia| Compliance {
         stiffness: x[1],

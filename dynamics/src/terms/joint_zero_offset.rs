@@ -11,14 +11,6 @@ use super::{
 };
 use crate::Model;
 
-/// A larger offset is no slip of a zero \[rad or m\].
-/// Physical: at arm's length such a joint misses by a hand's width, which nobody overlooks.
-const LARGEST: f64 = 0.2;
-
-/// A smaller offset is how zeros are set \[rad or m\]; bodies that are off by a few millimetres imitate it.
-/// Physical: a third of a degree, as marks and notches of joints are read.
-const LEAST: f64 = 0.006;
-
 /// The joint stands at the recorded position plus the offset: the effort of the robot there less that at the recorded
 /// position. To first order linear in the offset.
 pub(super) static EFFECT: Effect = Effect {
@@ -40,7 +32,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: Some(|_, x| is_told(x[0])),
     excitation: Excitation::Poses,
     simulated: Simulated::Model,
     concealed: Some(|draw| {
@@ -55,11 +46,6 @@ pub(super) static EFFECT: Effect = Effect {
     },
     build: |site, values| JointZeroOffset::boxed(&EFFECT, site, values, While::Always),
 };
-
-/// Whether an offset is one that is worth telling \[rad or m\].
-pub(super) fn is_told(offset: f64) -> bool {
-    (LEAST..=LARGEST).contains(&offset.abs())
-}
 
 /// An offset by the first of its coordinates, for good or for a while.
 #[derive(Debug)]

@@ -1,7 +1,7 @@
 //! A joint whose zero is another one in one recording than in the others.
 
 use super::ghost::While;
-use super::joint_zero_offset::{JointZeroOffset, is_told};
+use super::joint_zero_offset::JointZeroOffset;
 use super::law::array;
 use super::payload_pickup::time;
 use super::{
@@ -37,7 +37,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: Some(|_, x| is_told(x[0])),
     excitation: Excitation::Poses,
     simulated: Simulated::No(
         "simulate that recording by a scenario of its own that has a `joint_zero_offset`",

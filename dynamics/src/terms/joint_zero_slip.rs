@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::ghost::While;
-use super::joint_zero_offset::{JointZeroOffset, is_told};
+use super::joint_zero_offset::JointZeroOffset;
 use super::payload_pickup::time;
 use super::{
     Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, MotionSample, Parameter,
@@ -41,7 +41,6 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::joint_zero_offset::EFFECT,
         numbers: &["offset_after_rad", "offset_before_rad"],
     }),
-    limit: Some(|_, x| is_told(x[1] - x[0])),
     excitation: Excitation::Poses,
     simulated: Simulated::No(
         "simulate the recordings from then on by a scenario of their own that has a `joint_zero_offset`",

@@ -7,10 +7,6 @@ use super::{
     Simulated, Traits, Words,
 };
 
-/// Delays that a channel may have beside the others \[s\]. A channel that is read every T s is late by T / 2 on average.
-/// Physical: from one period of a controller to a channel that is read twice a second.
-const DELAYS_S: std::ops::RangeInclusive<f64> = 0.004..=0.25;
-
 /// Recorded effort of the joint: the true one as it was a while ago.
 pub(super) static EFFECT: Effect = Effect {
     name: "late_effort",
@@ -36,7 +32,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: Some(|_, x| DELAYS_S.contains(&x[0])),
     excitation: Excitation::Fast,
     simulated: Simulated::Record,
     concealed: Some(|_| Drawn::new([1e-3, 0.2], |delay| vec![("delay_s", delay)])),

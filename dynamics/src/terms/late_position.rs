@@ -9,10 +9,6 @@ use super::{
     PlaceKind, Simulated, Site, Term, Traits, Words,
 };
 
-/// Delays that a channel may have beside the others \[s\].
-/// Physical: from one period of a controller to a fifth of a second, after which a joint is elsewhere and not late.
-const DELAYS_S: std::ops::RangeInclusive<f64> = 0.004..=0.2;
-
 /// The joint is where it will be reported a while later. The way there is the Taylor series of the recorded motion up to
 /// the jerk, so motion much faster than the delay is followed less exactly.
 pub(super) static EFFECT: Effect = Effect {
@@ -39,7 +35,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: Some(|_, x| DELAYS_S.contains(&x[0])),
     excitation: Excitation::Fast,
     simulated: Simulated::No(
         "shift the position of that joint in a simulated recording, for example in its CSV table",

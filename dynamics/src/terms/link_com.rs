@@ -6,12 +6,7 @@ use super::{
     Words,
 };
 use crate::Inertia;
-use crate::kinematic_tree::length_m;
 
-/// A link's centre of mass stays within the link: it is off by less than this many radii of gyration, or than the link is
-/// long by its frames: from one end to the other. Physical: a uniform rod ends the root of 3 radii of gyration from its centre (its moment of
-/// inertia is m l²/12), a plumper body nearer.
-const MOST_GYRATIONS: f64 = 1.732;
 /// Largest offset of a centre of mass that is drawn at random \[m\].
 /// Tuned: for simulated cells only; not swept.
 const MOST_DRAWN_M: f64 = 0.06;
@@ -44,11 +39,6 @@ pub static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: Some(|site, x| {
-        let shift_m = x.iter().map(|d| d * d).sum::<f64>().sqrt();
-        let gyration_m = site.model.links()[site.link].gyration_radius_m();
-        shift_m < length_m(site.model, site.link).max(MOST_GYRATIONS * gyration_m)
-    }),
     excitation: Excitation::Poses,
     simulated: Simulated::Model,
     concealed: Some(|draw| {

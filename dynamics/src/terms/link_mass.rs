@@ -34,7 +34,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: Some(|site, x| x[0].abs() < site.model.links()[site.link].mass_kg()),
     excitation: Excitation::Poses,
     simulated: Simulated::Model,
     concealed: Some(|draw| {

@@ -29,7 +29,6 @@ pub static EFFECT: Effect = Effect {
     to_parameters: |c| parameters(&array(c)).to_vec(),
     to_coordinates: |p| inertia(&array(p)).parameters().to_vec(),
     simpler: None,
-    limit: None,
     excitation: Excitation::Poses,
     simulated: Simulated::Model,
     concealed: Some(|draw| drawn(draw, None)),

@@ -37,7 +37,6 @@ pub static EFFECT: Effect = Effect {
     to_parameters: parameters_with_times,
     to_coordinates: coordinates_with_times,
     simpler: None,
-    limit: None,
     excitation: Excitation::Poses,
     simulated: Simulated::No(
         "simulate the recordings before and after it by scenarios of their own, one of which has a `payload`",

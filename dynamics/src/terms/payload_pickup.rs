@@ -36,7 +36,6 @@ pub static EFFECT: Effect = Effect {
     to_parameters: parameters_with_times,
     to_coordinates: coordinates_with_times,
     simpler: None,
-    limit: None,
     excitation: Excitation::Poses,
     simulated: Simulated::CarriedForAWhile,
     concealed: Some(|draw| drawn(draw, Some([[0.2, 0.4], [0.6, 0.85]]))),

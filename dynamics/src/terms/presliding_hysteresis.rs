@@ -6,10 +6,6 @@ use super::{
     Scale, Simpler, Simulated, Site, Term, Traits, Words,
 };
 
-/// A joint breaks away within this: bristles that give more are a spring \[rad or m\].
-/// Tuned: not swept.
-const MOST_PRESLIDING_RAD: f64 = 0.1;
-
 /// The `LuGre` model with a static friction that equals the kinetic one (Canudas de Wit, Olsson, Åström
 /// and Lischinsky, "A New Model for Control of Systems with Friction", 1995, equations 1 to 3), written
 /// in the share u = σ0 z / Fc of the bristles' deflection at which they slide, and κ = σ0 / Fc:
@@ -44,7 +40,6 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::coulomb_friction::EFFECT,
         numbers: &["coulomb_nm"],
     }),
-    limit: Some(|_, x| x[2] >= 1.0 / MOST_PRESLIDING_RAD),
     excitation: Excitation::Speeds,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

@@ -35,7 +35,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: None,
     excitation: Excitation::Fast,
     simulated: Simulated::Record,
     concealed: Some(|_| Drawn::new([0.1, 10.0], |late| vec![("delay_per_hour_s", late)])),

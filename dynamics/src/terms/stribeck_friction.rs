@@ -6,10 +6,6 @@ use super::{
     Simulated, Traits, Words, sign,
 };
 
-/// Friction that falls with speed keeps at least this share of what it is when a joint breaks away: none falls to nothing.
-/// Tuned: not swept.
-const LEAST_SLIDING: f64 = 0.2;
-
 /// Effort (Fc + (Fs - Fc) exp(-(qd/vs)²)) sgn(qd) (Armstrong-Hélouvry, Dupont and Canudas de Wit, "A
 /// survey of models, analysis tools and compensation methods for the control of machines with
 /// friction", 1994, equation 2, with the exponent 2).
@@ -42,7 +38,6 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::coulomb_friction::EFFECT,
         numbers: &["coulomb_nm", "static_nm"],
     }),
-    limit: Some(|_, x| x[0] >= LEAST_SLIDING * (x[0] + x[1])),
     excitation: Excitation::Speeds,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

@@ -25,7 +25,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: None,
     excitation: Excitation::Speeds,
     simulated: Simulated::Record,
     concealed: Some(|draw| Drawn::new(draw.efforts_nm(), |f| vec![("subtracted_nm", f)])),

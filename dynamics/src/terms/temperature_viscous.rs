@@ -6,13 +6,9 @@ use super::{
     Simulated, Traits, Words,
 };
 
-/// Friction leaves at least this share of what it was when cold: none goes for good.
-/// Tuned: not swept.
-const LEAST_LEFT: f64 = 0.1;
 /// Shortest time constant that is searched, and that is told \[s\]: what wants a shorter one is no warmth.
 /// Physical: no gearbox warms up at once.
 const SEARCHED_FROM_S: f64 = 3.0;
-const TOLD_FROM_S: f64 = 3.05;
 /// No joint warms up faster where one is drawn \[s\].
 /// Tuned: for simulated cells only, whose recordings are short; not swept.
 const FASTEST_DRAWN_S: f64 = 3.2;
@@ -48,7 +44,6 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::viscous_friction::EFFECT,
         numbers: &["viscous_warm_nms_per_rad"],
     }),
-    limit: Some(|_, x| x[0] >= LEAST_LEFT * (x[0] + x[1]) && x[2] >= TOLD_FROM_S),
     excitation: Excitation::Speeds,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

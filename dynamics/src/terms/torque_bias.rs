@@ -25,7 +25,6 @@ pub static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: None,
     excitation: Excitation::WholeRange,
     simulated: Simulated::Record,
     concealed: Some(|draw| {

@@ -27,7 +27,6 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: None,
     excitation: Excitation::Fast,
     simulated: Simulated::Record,
     concealed: Some(|_| Drawn::new([1e-3, 0.2], |delay| vec![("delay_s", delay)])),

@@ -41,7 +41,6 @@ pub(super) static EFFECT: Effect = Effect {
         vec![-p[0] * cos, -p[0] * sin, p[1]]
     },
     simpler: None,
-    limit: None,
     excitation: Excitation::WholeRange,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

@@ -28,7 +28,6 @@ pub static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: None,
     excitation: Excitation::Speeds,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

@@ -7,14 +7,6 @@ use super::{
     Simulated, Traits, Words,
 };
 
-/// A smaller change, as a share of the larger value, is what friction does from day to day.
-/// Tuned: as for `friction_step`; not swept.
-const LEAST_STEP: f64 = 0.1;
-
-/// In the first seconds of a session a motor and its drive settle; friction that changes then has not changed once \[s\].
-/// Physical: what settles with the shortest time constant of `temperature_viscous`, 3 s, is gone by four fifths then.
-const FIRST_S: f64 = 5.0;
-
 /// Effort Fv qd, Fv being one value before a time of the session and another from then on.
 pub(super) static EFFECT: Effect = Effect {
     name: "viscous_step",
@@ -46,7 +38,6 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::viscous_friction::EFFECT,
         numbers: &["viscous_after_nms_per_rad", "viscous_before_nms_per_rad"],
     }),
-    limit: Some(|_, x| (x[1] - x[0]).abs() > LEAST_STEP * x[0].max(x[1]) && x[2] > FIRST_S),
     excitation: Excitation::Speeds,
     simulated: Simulated::Joint,
     concealed: None,

@@ -8,10 +8,6 @@ pub const MEDIAN_OF_ABS_NORMAL: f64 = 0.6745;
 /// Variance of the fourth difference of white noise with variance 1.
 /// Statistical: the sum of the squared coefficients, 1 + 16 + 36 + 16 + 1.
 const FOURTH_DIFFERENCE_VARIANCE: f64 = 70.0;
-/// A difference below this share of the largest value is one of rounding.
-/// Resolution: of numbers with 32 bits, as many drivers tell them.
-const ROUNDING: f64 = 1e-7;
-
 /// Variance of the white noise on a smooth signal, from its fourth differences, robust against jumps.
 pub fn white_variance(signal: &[f64]) -> f64 {
     let mut squares: Vec<f64> = signal
@@ -46,17 +42,6 @@ pub fn of_effort(signal: &[f64]) -> (f64, f64) {
     };
     let share = new.len() as f64 / signal.len().max(1) as f64;
     (white_variance(&new).max(of_step), share)
-}
-
-/// The step in which a signal is told: the smallest difference of two of its values, if any two values differ. Of a signal
-/// that is told finely it is next to nothing.
-pub fn step(signal: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = signal.filter(|x| x.is_finite()).collect();
-    values.sort_by(f64::total_cmp);
-    let largest = values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-    let steps = values.windows(2).map(|pair| pair[1] - pair[0]);
-    let steps = steps.filter(|step| *step > ROUNDING * largest);
-    steps.min_by(f64::total_cmp)
 }
 
 /// White noise of the measured effort of a joint \[effort unit\]. Not a number for recordings of poses, whose differences are
@@ -101,15 +86,6 @@ mod tests {
         assert!((once.sqrt() - 0.1).abs() < 0.01, "{once}");
         assert!((often / once - 1.0).abs() < 1e-9, "{often}");
         assert!(all > 0.999 && (few - 0.1).abs() < 1e-9, "{few}");
-    }
-
-    #[test]
-    fn an_effort_is_told_in_steps_or_finely() {
-        let fine = told(2);
-        let coarse = fine.iter().map(|x| (8.0 * x).round() / 8.0);
-        assert_eq!(step(coarse), Some(0.125));
-        assert!(step(fine.into_iter()).is_some_and(|step| step < 1e-4));
-        assert_eq!(step([3.0; 9].into_iter()), None);
     }
 
     #[test]

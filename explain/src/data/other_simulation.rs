@@ -13,7 +13,9 @@ use crate::data::track::{FitTrack, Track};
 use crate::read::input::Input;
 use crate::read::recording::Recording;
 
-use regression::{factors, median, plain_columns, range, regressed, rich_columns};
+use regression::{
+    factors, independent_rows, median, plain_columns, range, regressed, rich_columns,
+};
 pub use states::leave_out_other_states;
 
 /// Samples to either side of one whose median tells a spike.
@@ -76,6 +78,16 @@ fn take_out_spikes(recording: &mut Recording, joints: usize) {
 /// recorded effort that is late is an effect of its own, `torque_delay`.
 fn lateness_s(problem: &Problem) -> f64 {
     let columns: Vec<Vec<f64>> = plain_columns(problem);
+    let on_time: Vec<f64> = (problem.measured.iter())
+        .zip(problem.rigid())
+        .map(|(measured, twin)| measured - twin)
+        .collect();
+    let rows = |joint: usize| {
+        let weight = &problem.weight[problem.joint_rows(joint)];
+        let left = regressed(problem, &columns, &on_time, joint, weight);
+        independent_rows(&left, weight)
+    };
+    let rows: Vec<f64> = (0..problem.joints).map(rows).collect();
     let unlikeliness = |late_s: f64| -> f64 {
         let twin: Vec<Vec<f64>> = (problem.tracks.iter())
             .map(|track| {
@@ -97,8 +109,7 @@ fn lateness_s(problem: &Problem) -> f64 {
             let count: f64 = weight.iter().sum();
             let square: f64 = left.iter().zip(weight).map(|(x, w)| w * x * x).sum();
             let noise = problem.white_noise[joint].powi(2).max(f64::MIN_POSITIVE);
-            let effective = problem.effective_samples[joint] * count;
-            0.5 * effective * (square / count.max(1.0)).max(noise).ln()
+            0.5 * rows[joint] * (square / count.max(1.0)).max(noise).ln()
         };
         (0..problem.joints).map(of_joint).sum()
     };
@@ -208,8 +219,9 @@ fn followed(problem: &Problem, joint: usize) -> [f64; TAPS] {
         }
     };
     let mut taps = [0.0; TAPS];
-    let effective = problem.effective_samples[joint] * weight.iter().sum::<f64>();
-    let gained = 0.5 * effective * (square(&beside) / square(&columns)).ln();
+    let plain = regressed(problem, &beside, &left, joint, weight);
+    let rows = independent_rows(&plain, weight);
+    let gained = 0.5 * rows * (square(&beside) / square(&columns)).ln();
     if gained >= LATE_EVIDENCE {
         let whole = found.iter().sum::<f64>().max(1.0);
         for (&tap, factor) in used.iter().zip(found) {

@@ -1,13 +1,11 @@
 //! From recordings to the data of a fit.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 use std::sync::{Arc, OnceLock};
 
 use tauscope_dynamics::Model;
 
-use crate::data::effective_samples::per_row;
-use crate::data::noise::{of_effort, step};
+use crate::data::noise::of_effort;
 use crate::data::problem::Problem;
 use crate::data::smoother::LowPass;
 use crate::data::track::{FitTrack, Track, moving_joints, spaced, thinned};
@@ -96,7 +94,8 @@ impl Problem {
                 let filter = LowPass::weighted(&track.time_s, cutoff_hz, |k| counts[k]);
                 let of_joint = (0..full.len()).map(|k| k * n + j);
                 let own = recording.effort[j..].iter().step_by(n).take(full.len());
-                problem.note_efforts(j, &own.map(|x| x * unit_nm[j]).collect::<Vec<_>>());
+                let largest = &mut problem.largest_effort[j];
+                *largest = own.fold(*largest, |most, x| most.max((x * unit_nm[j]).abs()));
                 let mut signal: Vec<f64> = of_joint
                     .map(|at| (recording.effort[at] - full.beside[at]) * unit_nm[j])
                     .collect();
@@ -108,7 +107,7 @@ impl Problem {
                 };
                 let rate = new * recording.rate_hz();
                 let share = (cutoff_hz * NOISE_BANDWIDTH / (0.5 * rate)).min(1.0);
-                variances[j].push((white * share, white));
+                variances[j].push(white * share);
                 if kept.len() < full.len() {
                     // Against aliasing.
                     LowPass::new(&full.time_s, ALIASING_RATIO * cutoff_hz).apply(&mut signal);
@@ -134,23 +133,11 @@ impl Problem {
                 problem.measured.extend(&measured[r * n + j]);
                 problem.weight.extend(&weight[r * n + j]);
             }
-            problem.acceleration_noise[j] = acceleration_noise(recordings, j, n, cutoff_hz);
-            variances[j].sort_by(|(a, _), (b, _)| a.total_cmp(b));
-            let (filtered, unfiltered) = variances[j][variances[j].len() / 2];
-            problem.white_noise[j] = deviation(filtered, problem.largest_effort[j]);
-            problem.unfiltered_noise[j] = deviation(unfiltered, problem.largest_effort[j]);
+            variances[j].sort_by(f64::total_cmp);
+            let variance = variances[j][variances[j].len() / 2];
+            problem.white_noise[j] = deviation(variance, problem.largest_effort[j]);
         }
-        problem.effective_samples = per_row(&problem);
         problem
-    }
-
-    /// Takes note of the largest of some efforts of a joint \[N m or N\], and of their step.
-    fn note_efforts(&mut self, joint: usize, efforts: &[f64]) {
-        let largest = &mut self.largest_effort[joint];
-        *largest = efforts.iter().fold(*largest, |most, x| most.max(x.abs()));
-        if let Some(step) = step(efforts.iter().copied()) {
-            self.effort_step[joint] = self.effort_step[joint].min(step);
-        }
     }
 
     /// No recordings of a robot.
@@ -164,12 +151,8 @@ impl Problem {
             measured: Vec::new(),
             weight: Vec::new(),
             white_noise: vec![0.0; n],
-            unfiltered_noise: vec![0.0; n],
-            effort_step: vec![f64::INFINITY; n],
-            acceleration_noise: vec![0.0; n],
             largest_effort: vec![0.0; n],
             cutoff_hz,
-            effective_samples: Vec::new(),
             known_friction: vec![BTreeMap::new(); n],
             is_foreign: false,
             first_gains: vec![1.0; model.dof()],
@@ -190,31 +173,6 @@ fn leave_out_unmeasured(counts: &mut [bool], recording: &Recording, joint: usize
     }
 }
 
-/// Variance that the white noise of a joint's position has as acceleration below a cutoff: its density, twice the variance
-/// over the rate, times (2 pi f)^4, from zero to the cutoff.
-fn acceleration_variance(recording: &Recording, joint: usize, n: usize, cutoff_hz: f64) -> f64 {
-    let position: Vec<f64> = (recording.position.iter().skip(joint).step_by(n).copied()).collect();
-    // A position may come in steps, as an effort may.
-    let (white, new) = of_effort(&position);
-    let rate_hz = new * recording.rate_hz();
-    if rate_hz <= 0.0 {
-        return 0.0;
-    }
-    2.0 * white / rate_hz * TAU.powi(4) * cutoff_hz.powi(5) / 5.0
-}
-
-/// Standard deviation of the same, of the recording in the middle.
-fn acceleration_noise(recordings: &[Recording], joint: usize, n: usize, cutoff_hz: f64) -> f64 {
-    let of = |recording| acceleration_variance(recording, joint, n, cutoff_hz);
-    let moving = recordings
-        .iter()
-        .filter(|recording| !recording.is_of_poses());
-    let mut all: Vec<f64> = moving.map(of).collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2)
-        .map_or(0.0, |variance| variance.sqrt())
-}
-
 /// Standard deviation of a noise, no less than what the numbers of a driver resolve.
 fn deviation(variance: f64, largest_effort: f64) -> f64 {
     variance.sqrt().max(RESOLUTION * largest_effort)
@@ -224,33 +182,7 @@ fn deviation(variance: f64, largest_effort: f64) -> f64 {
 mod tests {
     use tauscope_dynamics::{Data, gravity_effort};
 
-    use crate::data::noise::MEDIAN_OF_ABS_NORMAL;
-    use crate::fixture::{Noise, model, problem, recording};
-
-    /// The density says what the smoother and the filter of the comparison make of the noise of a joint that stands.
-    #[test]
-    fn the_noise_of_a_position_is_so_much_acceleration() {
-        let model = model();
-        let mut noise = Noise(5);
-        let recordings = [1, 2, 3].map(|seed| {
-            let mut recording = recording(&model, seed, |_, _, _| {});
-            for position in &mut recording.position {
-                *position = 1e-3 * noise.next();
-            }
-            recording
-        });
-        let problem = problem(&model, &recordings);
-        let accelerations: Vec<Vec<f64>> = (problem.tracks.iter())
-            .map(|track| track.track.acceleration.clone())
-            .collect();
-        let mut seen = vec![0.0; problem.rows];
-        problem.joint_signal(&accelerations, 1, &mut seen);
-        // Accelerations at the ends of a recording are far less certain: of all rows the one in the middle.
-        seen.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
-        let deviation = seen[seen.len() / 2].abs() / MEDIAN_OF_ABS_NORMAL;
-        let ratio = problem.acceleration_noise[1] / deviation;
-        assert!((0.7..1.4).contains(&ratio), "{ratio}");
-    }
+    use crate::fixture::{model, problem, recording};
 
     /// A log of one row a pose, whose time counts the rows: the effort of a pose is compared with the gravity at that pose.
     #[test]

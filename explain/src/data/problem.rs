@@ -30,20 +30,10 @@ pub struct Problem {
     /// Standard deviation of the measured effort's white noise after the filter, by joint \[N m\]: the least
     /// that any model can leave.
     pub white_noise: Vec<f64>,
-    /// The same before the filter \[N m\].
-    pub unfiltered_noise: Vec<f64>,
-    /// The step in which the measured effort is told, by joint \[N m or N\]: the smallest that any recording shows; infinite
-    /// if the effort never changes.
-    pub effort_step: Vec<f64>,
-    /// What the noise of its recorded position makes of a joint's acceleration below the comparison's cutoff, by joint
-    /// \[rad/s² or m/s²\].
-    pub acceleration_noise: Vec<f64>,
     /// Largest measured effort by joint, unfiltered \[N m\].
     pub largest_effort: Vec<f64>,
     /// Half amplitude of the filter \[Hz\].
     pub cutoff_hz: f64,
-    /// Effective (independent) samples per row of noise, by joint: 0 to 1.
-    pub effective_samples: Vec<f64>,
     /// Coulomb and viscous friction by joint that the twin has already: by so much they may be less.
     pub known_friction: Vec<BTreeMap<&'static str, f64>>,
     /// Whether the twin's effort is another simulation's, which follows the command and not the motion.

@@ -110,12 +110,7 @@ impl Step<'_> {
 }
 
 /// The numbers of a set, refined.
-pub fn refined(
-    problem: &Problem,
-    space: &Space,
-    objective: &Objective<'_>,
-    set: &Set,
-) -> Solution {
+pub fn refined(problem: &Problem, space: &Space, objective: &Objective<'_>, set: &Set) -> Solution {
     let factors = objective.factors(set);
     let own = set.iter().map(|&v| &objective.variants[v]);
     let actives = own

@@ -60,6 +60,13 @@ impl Variant {
         self.hypothesis.with(coordinates)
     }
 
+    /// Whether several joints feel it and its effort is not linear in its numbers: a tangent says little of it.
+    pub fn bends(&self) -> bool {
+        let hypothesis = self.hypothesis;
+        let is_bent = !hypothesis.is_linear() || hypothesis.effect.traits.bends;
+        is_bent && hypothesis.only_joint().is_none()
+    }
+
     /// Deviations of an effect's factors from their means.
     pub fn factors_of(&self, active: &Active) -> Vec<f64> {
         if let Some(curve) = &self.curve {

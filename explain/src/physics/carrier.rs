@@ -117,7 +117,11 @@ mod tests {
         let together = Fit::new(&problem, vec![payload.clone(), offset.clone()]);
         assert!(square(&together) < 1e-6 * bare, "{}", square(&together));
         // Also where the rest is taken from a fit without the payload.
-        let added = Fit::beside(&problem, vec![offset.clone(), payload.clone()], Some(&alone));
+        let added = Fit::beside(
+            &problem,
+            vec![offset.clone(), payload.clone()],
+            Some(&alone),
+        );
         assert!(square(&added) < 1e-6 * bare, "{}", square(&added));
         // And where one joint's recording is transformed.
         let gain = at_joint("torque_gain", 0).with(vec![0.0]);

@@ -37,7 +37,6 @@ pub static EFFECT: Effect = Effect {
     to_parameters: |c| vec![1.0 + c[0]],
     to_coordinates: |p| vec![p[0] - 1.0],
     simpler: None,
-    limit: None,
     excitation: Excitation::Poses,
     simulated: Simulated::Record,
     concealed: None,

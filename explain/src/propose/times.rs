@@ -62,7 +62,10 @@ pub fn shapes(problem: &Problem, fit: &Fit, hypothesis: Hypothesis) -> Vec<Vec<f
         TimeKind::Once if traits.fills_recording => scan.recordings(all),
         TimeKind::Once => {
             let tracks = 0..problem.tracks.len();
-            best(tracks.flat_map(|track| scan.ranked(all, Some(track))), |_, _| false)
+            best(
+                tracks.flat_map(|track| scan.ranked(all, Some(track))),
+                |_, _| false,
+            )
         }
     };
     let with = |times: Vec<f64>| {
@@ -209,8 +212,16 @@ impl Scan<'_> {
             let starts = part.start > 0;
             let ends = part.end < session.bins;
             vec![
-                if starts { session.at_s(part.start) } else { -FOR_GOOD_S },
-                if ends { session.at_s(part.end) } else { FOR_GOOD_S },
+                if starts {
+                    session.at_s(part.start)
+                } else {
+                    -FOR_GOOD_S
+                },
+                if ends {
+                    session.at_s(part.end)
+                } else {
+                    FOR_GOOD_S
+                },
             ]
         };
         best(parts, is_near).into_iter().map(times).collect()
@@ -318,7 +329,10 @@ mod tests {
             panic!("two times");
         };
         let session_s = |k: usize| problem.tracks[k].track.session_s;
-        assert!(session_s(with - 1) < to_s && to_s <= session_s(with), "{to_s}");
+        assert!(
+            session_s(with - 1) < to_s && to_s <= session_s(with),
+            "{to_s}"
+        );
         [from_s, to_s]
     }
 

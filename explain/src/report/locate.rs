@@ -4,33 +4,20 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::report::schema::Located;
 
-/// A joint is listed if its mismatch is at least this many times its noise (RMS).
-/// Tuned: by hand, on no recorded seeds; not swept.
-const LEAST_OVER_NOISE: f64 = 1.5;
-/// A state is listed if its mean square is this many times the joint's over all states.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const CONCENTRATED: f64 = 1.4;
-/// A state with fewer rows than this is not listed.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const LEAST_ROWS: usize = 12;
-/// Quantile below which a speed is slow.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const SLOWEST: f64 = 0.2;
-/// Quantile above which a speed, an acceleration or a load is high.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const HIGHEST: f64 = 0.8;
-/// Positions are divided into this many parts with equally many rows.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const POSITION_PARTS: i32 = 5;
-/// Share of the rows in such a part.
-/// Statistical: 1 over [`POSITION_PARTS`].
-const POSITION_PART: f64 = 0.2;
-/// Recordings are divided into this many parts of equal length.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const TIME_PARTS: i32 = 4;
+/// Rows are sorted by position, speed, acceleration or load into this many parts with equally many rows, and recordings
+/// cut into as many parts of equal length.
+/// Resolution: of words as slow and fast.
+const PARTS: i32 = 5;
 /// How many states of a joint are listed.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Resolution: the page shows the first few.
 const MOST_STATES: usize = 3;
+
+/// Whether the mean of `count` squares is larger than `usual` by more than chance: by three standard deviations of that mean,
+/// if they are of a normal variable.
+fn stands_out(mean: f64, usual: f64, count: usize) -> bool {
+    let spread = (2.0 / count.max(1) as f64).sqrt();
+    mean > usual * (1.0 + 3.0 * spread)
+}
 
 /// The mismatch of each joint over all states, followed by the states in which it is concentrated; the largest first.
 pub fn located(problem: &Problem, before: &Fit, joints: &[String]) -> Vec<Located> {
@@ -41,7 +28,7 @@ pub fn located(problem: &Problem, before: &Fit, joints: &[String]) -> Vec<Locate
         let mean = total / rows.len().max(1) as f64;
         let noise = problem.white_noise[j].max(1e-12);
         let over_noise = mean.sqrt() / noise;
-        if over_noise < LEAST_OVER_NOISE {
+        if !stands_out(mean, noise * noise, rows.len()) {
             continue;
         }
         let whole = Located {
@@ -87,12 +74,10 @@ fn concentrated(problem: &Problem, rows: &[Row], name: &str, noise: f64) -> Vec<
     let mean = total / rows.len().max(1) as f64;
     let mut states: Vec<Located> = Vec::new();
     let mut state = |place: String, of: &dyn Fn(&Row) -> bool| {
-        let (count, sum) = rows
-            .iter()
-            .filter(|s| of(s))
-            .fold((0, 0.0), |(count, sum), s| (count + 1, sum + s.square));
-        let square = sum / f64::from(count.max(1));
-        if count as usize >= LEAST_ROWS && square > CONCENTRATED * mean {
+        let squares: Vec<f64> = rows.iter().filter(|s| of(s)).map(|s| s.square).collect();
+        let sum: f64 = squares.iter().sum();
+        let square = sum / squares.len().max(1) as f64;
+        if stands_out(square, mean, squares.len()) {
             states.push(Located {
                 joint: name.to_owned(),
                 place,
@@ -101,8 +86,10 @@ fn concentrated(problem: &Problem, rows: &[Row], name: &str, noise: f64) -> Vec<
             });
         }
     };
-    let slow = quantile(rows, |s| s.velocity.abs(), SLOWEST);
-    let fast = quantile(rows, |s| s.velocity.abs(), HIGHEST);
+    let share = |part: i32| f64::from(part) / f64::from(PARTS);
+    let (first, last) = (share(1), share(PARTS - 1));
+    let slow = quantile(rows, |s| s.velocity.abs(), first);
+    let fast = quantile(rows, |s| s.velocity.abs(), last);
     state(
         format!("slow and around reversals, |qd| < {slow:.3} rad/s"),
         &|s| s.velocity.abs() < slow,
@@ -112,19 +99,19 @@ fn concentrated(problem: &Problem, rows: &[Row], name: &str, noise: f64) -> Vec<
     });
     state("moving forward".to_owned(), &|s| s.velocity > 0.0);
     state("moving backward".to_owned(), &|s| s.velocity < 0.0);
-    let hard = quantile(rows, |s| s.acceleration.abs(), HIGHEST);
+    let hard = quantile(rows, |s| s.acceleration.abs(), last);
     state(
         format!("accelerating hard, |qdd| > {hard:.2} rad/s²"),
         &|s| s.acceleration.abs() > hard,
     );
-    let loaded = quantile(rows, |s| s.load.abs(), HIGHEST);
+    let loaded = quantile(rows, |s| s.load.abs(), last);
     state(
         format!("under high load, |effort| > {loaded:.1} N m"),
         &|s| s.load.abs() > loaded,
     );
-    for part in 0..POSITION_PARTS {
-        let low = quantile(rows, |s| s.position, POSITION_PART * f64::from(part));
-        let high = quantile(rows, |s| s.position, POSITION_PART * f64::from(part + 1));
+    for part in 0..PARTS {
+        let low = quantile(rows, |s| s.position, share(part));
+        let high = quantile(rows, |s| s.position, share(part + 1));
         state(format!("position {low:.2} to {high:.2} rad"), &|s| {
             s.position >= low && s.position < high
         });
@@ -133,9 +120,8 @@ fn concentrated(problem: &Problem, rows: &[Row], name: &str, noise: f64) -> Vec<
         let recording = &track.track.name;
         state(format!("recording {recording}"), &|s| s.recording == r);
         let end = track.track.time_s.last().copied().unwrap_or(0.0);
-        for part in 0..TIME_PARTS {
-            let at = |part: i32| end * f64::from(part) / f64::from(TIME_PARTS);
-            let (from, to) = (at(part), at(part + 1));
+        for part in 0..PARTS {
+            let (from, to) = (end * share(part), end * share(part + 1));
             state(
                 format!("recording {recording}, {from:.1} to {to:.1} s"),
                 &|s| s.recording == r && s.time_s >= from && s.time_s < to,

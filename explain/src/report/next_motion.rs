@@ -14,23 +14,20 @@ use crate::report::schema::{NextMotion, Rival};
 /// How the name of a file with a motion to record next begins.
 pub const MOTION_PREFIX: &str = "next_";
 
-/// Share of a joint's range that a trajectory uses.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const RANGE: f64 = 0.8;
-/// Share of a joint's speed limit that a trajectory uses.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const SPEED: f64 = 0.7;
+/// Share of a joint's range, and of its speed limit, that a trajectory uses.
+/// Physical: a fifth stays free for a controller that overshoots.
+const SHARE: f64 = 0.8;
 /// Half the range of a joint without position limits in the URDF \[rad or m\].
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Physical: a quarter of a turn to either side.
 const DEFAULT_HALF_RANGE: f64 = 1.5;
 /// Speed limit of a joint without one in the URDF \[rad/s or m/s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Physical: slower than that of every arm for sale.
 const DEFAULT_SPEED: f64 = 1.0;
 /// Highest acceleration \[rad/s² or m/s²\].
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Physical: URDFs give none, and collaborative arms reach it.
 const ACCELERATION: f64 = 4.0;
 /// How long a part of a trajectory lasts \[s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Resolution: two periods of its slowest wave.
 const PART_S: f64 = 20.0;
 /// Time between two rows of a trajectory \[s\].
 /// Resolution: 100 rows per second; changes the file's size.
@@ -38,39 +35,23 @@ const STEP_S: f64 = 0.01;
 /// The slowest speed of a creeping joint \[rad/s or m/s\].
 /// Physical: twice what counts as standstill, and well below usual Stribeck velocities.
 const CREEP: f64 = 0.02;
-/// How many speeds a creeping joint has.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// How many speeds a creeping joint has, and each over the one before.
+/// Resolution: evenly by logarithm from creeping to half a rad/s.
 const SPEEDS: usize = 5;
-/// Each of these speeds over the one before.
-/// Tuned: by hand, on no recorded seeds; not swept.
 const FASTER: f64 = 2.2;
 /// How long a creeping joint takes to reach its speed, and to stop \[s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Physical: at the highest of these speeds, less than [`ACCELERATION`].
 const RAMP_S: f64 = 0.3;
 /// How long the other motions take to fade in, and to fade out \[s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Resolution: a tenth of a part.
 const FADE_S: f64 = 2.0;
-/// Share of the largest possible swing that a wave has.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const SWING: f64 = 0.8;
-/// Highest frequency of a motion over the whole range \[Hz\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-const WHOLE_RANGE_HZ: f64 = 0.1;
-/// Share of the swing, frequency \[Hz\], and how much more of it each further joint has \[Hz\], of fast reversals.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const FAST: [Wave; 3] = [[0.3, 0.4, 0.13], [0.3, 1.5, 0.29], [0.4, 4.3, 0.37]];
-/// The same for a joint at all speeds.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const ALL_SPEEDS: [Wave; 2] = [[0.6, 0.15, 0.0], [0.4, 1.1, 0.0]];
-/// The same for the other joints meanwhile.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const OTHER_JOINTS: [Wave; 1] = [[0.5, 0.11, 0.03]];
-/// The same for all poses.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const ALL_POSES: [Wave; 2] = [[0.7, 0.1, 0.037], [0.3, 0.6, 0.11]];
-
-/// A sine: share of the swing, frequency \[Hz\], and how much more of it each further joint has \[Hz\].
-type Wave = [f64; 3];
+/// Harmonics of a wave.
+/// Resolution: as in Swevers et al., "Optimal Robot Excitation and Identification", *IEEE Transactions on Robotics and
+/// Automation* 13, 1997.
+const HARMONICS: u32 = 5;
+/// Angle between the phases of two harmonics, which keeps joints and harmonics out of step \[rad\].
+/// Resolution: the golden angle.
+const PHASE: f64 = 2.4;
 
 /// What a motion must excite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -239,35 +220,38 @@ fn position(model: &Model, excite: Excite, joint: usize, centre: &[f64], j: usiz
         ),
     };
     let middle = centre[j].clamp(lower, upper);
-    let room = RANGE * (upper - middle).min(middle - lower).max(0.0);
-    let speed = SPEED * limits.velocity.unwrap_or(DEFAULT_SPEED);
+    let room = SHARE * (upper - middle).min(middle - lower).max(0.0);
+    let speed = SHARE * limits.velocity.unwrap_or(DEFAULT_SPEED);
     // Fades in and out, so that it begins and ends at rest.
-    let fade = |t: f64| (t / FADE_S).min((PART_S - t) / FADE_S).clamp(0.0, 1.0);
-    let smooth = |x: f64| x * x * (3.0 - 2.0 * x);
-    // The largest swing of this frequency that speed, acceleration and range allow.
-    let swing = |hz: f64| {
-        let omega = TAU * hz;
-        room.min(speed / omega).min(ACCELERATION / (omega * omega))
-    };
-    let wave = |hz: f64| SWING * swing(hz) * (TAU * hz * t).sin();
-    let sum = |waves: &[Wave]| -> f64 {
-        let one = |[share, hz, further]: &Wave| share * wave(hz + further * j as f64);
-        waves.iter().map(one).sum()
-    };
+    let fade = (t / FADE_S).min((PART_S - t) / FADE_S).clamp(0.0, 1.0);
+    let fade = fade * fade * (3.0 - 2.0 * fade);
     let own = j == joint;
-    let move_by = match excite {
-        Excite::WholeRange if own => {
-            let hz = (speed / (TAU * room.max(1e-6))).min(WHOLE_RANGE_HZ);
-            room.min(swing(hz)) * (TAU * hz * t).sin()
-        }
+    let base_hz = match excite {
         Excite::Creep if own => return middle + crept(room, speed, t),
-        Excite::WholeRange | Excite::Creep => 0.0,
-        Excite::Fast => sum(&FAST),
-        Excite::AllSpeeds if own => sum(&ALL_SPEEDS),
-        Excite::AllSpeeds => sum(&OTHER_JOINTS),
-        Excite::AllPoses => sum(&ALL_POSES),
+        Excite::Creep => return middle,
+        Excite::WholeRange if !own => return middle,
+        Excite::WholeRange | Excite::AllPoses => 2.0 / PART_S,
+        Excite::AllSpeeds => 4.0 / PART_S,
+        Excite::Fast => 16.0 / PART_S,
     };
-    middle + smooth(fade(t)) * move_by
+    middle + fade * wave(base_hz, j, [room, speed, ACCELERATION], t)
+}
+
+/// A finite Fourier series whose harmonics have one amplitude of velocity, as large as these limits of position, velocity
+/// and acceleration allow (Swevers et al., 1997).
+fn wave(base_hz: f64, joint: usize, [position, velocity, acceleration]: [f64; 3], t: f64) -> f64 {
+    let omega = TAU * base_hz;
+    let all = || (1..=HARMONICS).map(f64::from);
+    let largest: f64 = all().map(|l| 1.0 / l).sum();
+    // The fade adds at most 1.5 / FADE_S of the position to the velocity.
+    let fastest = all().map(|_| omega).sum::<f64>() + 1.5 / FADE_S * largest;
+    let hardest = omega * omega * all().sum::<f64>();
+    let amplitude = (position / largest)
+        .min(velocity / fastest)
+        .min(acceleration / hardest);
+    let phase = |l: f64| PHASE * (l + f64::from(HARMONICS) * joint as f64);
+    let series = all().map(|l| (l * omega * t + phase(l)).sin() / l);
+    amplitude * series.sum::<f64>()
 }
 
 #[cfg(test)]

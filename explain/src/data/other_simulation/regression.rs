@@ -87,6 +87,20 @@ pub fn factors(
     (0..p).map(|a| theta[a] / scale[a]).collect()
 }
 
+/// How many independent rows say as much as all with weight: `n (1 - r) / (1 + r)` with r the correlation of neighbouring
+/// rows (Bayley and Hammersley, "The 'Effective' Number of Independent Observations in an Autocorrelated Time Series",
+/// 1946).
+pub fn independent_rows(left: &[f64], weight: &[f64]) -> f64 {
+    let (mut product, mut square) = (0.0, f64::MIN_POSITIVE);
+    for (x, w) in left.windows(2).zip(weight.windows(2)) {
+        let both = w[0] * w[1];
+        product += both * x[0] * x[1];
+        square += 0.5 * both * (x[0] * x[0] + x[1] * x[1]);
+    }
+    let r = (product / square).max(0.0);
+    (1.0 - r) / (1.0 + r) * weight.iter().sum::<f64>()
+}
+
 /// The middle one; 0 of none.
 pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);

@@ -1,6 +1,5 @@
 //! Rows at which another simulation's joint moves in one direction and the real joint in another, or not at all.
 
-use crate::data::effective_samples::per_row;
 use crate::data::noise::MEDIAN_OF_ABS_NORMAL;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
@@ -62,7 +61,6 @@ pub fn leave_out_other_states(problem: &mut Problem) {
         kept[rows].copy_from_slice(&weight);
     }
     problem.weight = kept;
-    problem.effective_samples = per_row(problem);
 }
 
 /// The rows of a joint near jumps of the other simulation's effort.
