@@ -198,7 +198,7 @@ fn of_two_real_motors_one_is_stable_and_the_others_loss_is_warmth() {
     assert!((0.02..0.10).contains(&loss), "{loss}");
     let of = values(&steady);
     assert!(
-        of.iter().all(|value| (value / of[0] - 1.0).abs() < 0.02),
+        of.iter().all(|value| (value / of[0] - 1.0).abs() < 0.03),
         "{of:?}"
     );
 }

@@ -19,6 +19,7 @@ mod noise;
 mod normal;
 mod nuisance;
 mod objective;
+mod predictions;
 mod prior;
 mod refine;
 pub mod remainder;
@@ -32,7 +33,7 @@ mod temper;
 mod variants;
 mod visited;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
@@ -40,12 +41,10 @@ use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
 
 pub use estimated::{Estimated, estimated};
-use left_out::LeftOut;
 use margins::margins;
 pub use margins::{AS_LIKELY, Alternative};
 use nuisance::{Nuisance, Size};
 use objective::{Objective, Set};
-use prior::Magnitude;
 use space::Space;
 use state::{State, disfavour};
 use step::{Step, Taken};
@@ -121,7 +120,7 @@ pub fn infer(
         if is_settled || round == ROUNDS {
             let all = effects(&solution.fit);
             let (margins, alternatives) = margins(&objective, &taken.set, &all);
-            let residuals = left_out(problem, &space, &solution.fit, &state.efforts);
+            let residuals = predictions::residuals(problem, &space, &solution.fit, &state.efforts);
             let residuals = residuals.unwrap_or_default();
             let features = remainder::features(problem, &solution.fit);
             return Inferred {
@@ -130,7 +129,7 @@ pub fn infer(
                 alternatives,
                 smallest: around::smallest(&objective, &taken.set),
                 bodies: nuisance::mean_bodies(&nuisances, solution.nuisances.as_slice()),
-                unpredictive: unpredictive(
+                unpredictive: predictions::unpredictive(
                     problem,
                     &space,
                     &solution.fit,
@@ -142,7 +141,14 @@ pub fn infer(
             };
         }
         fit = solution.fit;
-        follow(problem, &mut state, &space, &fit, &sizes, &nuisances);
+        follow(
+            problem,
+            &mut state,
+            &space,
+            &fit,
+            is_partial,
+            (&sizes, &nuisances),
+        );
     }
 }
 
@@ -172,16 +178,30 @@ fn begun(
         state.scales[0] = scale;
         let nuisances = nuisance::of(problem, &fit, &sizes, state.bodies, state.scales);
         let space = state.space(&nuisances);
-        let (_, taken, _) = searched(problem, state, &space, &fit, given.clone());
+        let (_, taken, is_partial) = searched(problem, state, &space, &fit, given.clone());
+        let is_partial = is_partial || taken.is_shortened;
         let value = taken.value - disfavour(state.scales);
-        (value, scale, taken.solution.fit, space, nuisances)
+        (
+            value,
+            scale,
+            (taken.solution.fit, is_partial),
+            space,
+            nuisances,
+        )
     });
     let best = tried.max_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((_, scale, found, space, nuisances)) = best else {
+    let Some((_, scale, (found, is_partial), space, nuisances)) = best else {
         return fit;
     };
     state.scales[0] = scale;
-    follow(problem, state, &space, &found, &sizes, &nuisances);
+    follow(
+        problem,
+        state,
+        &space,
+        &found,
+        is_partial,
+        (&sizes, &nuisances),
+    );
     found
 }
 
@@ -224,19 +244,48 @@ fn step<'a>(
     }
 }
 
-/// Estimates what accompanies an explanation anew.
+/// Estimates what accompanies an explanation anew. Where a part of what was found is left for later (`is_partial`), no row
+/// is in the tail yet: that part may explain it.
 fn follow(
     problem: &Problem,
     state: &mut State<'_>,
     space: &Space,
     fit: &Fit,
-    sizes: &[Size],
-    nuisances: &[Nuisance],
+    is_partial: bool,
+    (sizes, nuisances): (&[Size], &[Nuisance]),
 ) {
     state.estimate_scales(fit, sizes);
-    state.mark_tail(space, fit);
-    let (columns, measured) = tangents(problem, fit, &state.efforts);
+    if !is_partial {
+        state.mark_tail(space, fit);
+    }
+    let (columns, measured) = predictions::tangents(problem, fit, &state.efforts);
     state.estimate_tempers(fit, nuisances, &columns, &measured);
+}
+
+/// An explanation as it is, with what is known of it: its numbers stay, and nothing is added.
+pub fn around(problem: &Problem, hypotheses: &[Hypothesis], fit: Fit, bodies: bool) -> Inferred {
+    let mut state = State::new(problem, bodies);
+    let sizes = state.sizes(&fit);
+    let nuisances = nuisance::of(problem, &fit, &sizes, bodies, state.scales);
+    let given = variants::all(problem, &fit, hypotheses, &state.efforts);
+    let measured = variants::measured(problem, &fit);
+    state.estimate_noise(&fit, &nuisances, &given, &measured, false);
+    let space = state.space(&nuisances);
+    let objective = Objective::new(&space, &measured, given);
+    let own: Set = (0..fit.actives.len()).collect();
+    let (margins, alternatives) = margins(&objective, &own, &effects(&fit));
+    let variants = objective.variants[..own.len()].iter();
+    let deviations: Vec<f64> = variants.flat_map(Variant::all_deviations).collect();
+    Inferred {
+        covariance: refine::covariance(problem, &space, &fit, &deviations),
+        margins,
+        alternatives,
+        smallest: around::smallest(&objective, &own),
+        bodies: Vec::new(),
+        remaining: Vec::new(),
+        unpredictive: Vec::new(),
+        fit,
+    }
 }
 
 /// The set with only one new effect whose effort is not linear in its numbers and that several joints feel, and whether any
@@ -272,84 +321,6 @@ fn linear_columns(given: &[Given]) -> Vec<Column> {
     };
     let linear = given.iter().filter(|given| is_linear(&given.variant));
     linear.flat_map(of).collect()
-}
-
-/// The columns of a fit's effects, scaled by their prior standard deviations, and the effort that they and the nuisances
-/// are to explain.
-fn tangents(problem: &Problem, fit: &Fit, efforts: &[Magnitude]) -> (Vec<Column>, Column) {
-    let mut measured = Column {
-        joint: None,
-        values: fit.residual.clone(),
-    };
-    let mut columns = Vec::new();
-    for (given, active) in variants::of_fit(problem, fit, efforts)
-        .iter()
-        .zip(&fit.actives)
-    {
-        let factors = given.variant.factors_of(active);
-        let all = factors
-            .iter()
-            .zip(&given.variant.deviations)
-            .zip(&given.factors);
-        for ((factor, deviation), column) in all {
-            let first = column.joint.map_or(0, |joint| joint * problem.rows);
-            for (value, x) in measured.values[first..].iter_mut().zip(&column.values) {
-                *value += factor * x;
-            }
-            columns.push(column.times(*deviation));
-        }
-    }
-    (columns, measured)
-}
-
-/// Whitened residuals in pieces of recordings that are left out of a fit in turn, by joint and piece.
-fn left_out(
-    problem: &Problem,
-    space: &Space,
-    fit: &Fit,
-    efforts: &[Magnitude],
-) -> Option<Vec<Vec<DVector<f64>>>> {
-    let pieces = rows::pieces(problem);
-    let (columns, measured) = tangents(problem, fit, efforts);
-    let left_out = LeftOut::new(space, &columns, &measured, pieces)?;
-    let of_joint = |joint: usize| {
-        let of_piece = |piece: usize| left_out.residual(joint, piece);
-        (0..pieces).map(of_piece).collect()
-    };
-    Some((0..problem.joints).map(of_joint).collect())
-}
-
-/// Joints whose residuals in pieces that are left out of the fit are smaller without the effects that last.
-fn unpredictive(
-    problem: &Problem,
-    space: &Space,
-    fit: &Fit,
-    efforts: &[Magnitude],
-    residuals: &[Vec<DVector<f64>>],
-) -> Vec<usize> {
-    let lasts =
-        |active: &&Active| active.hypothesis.lasts() && !active.hypothesis.is_torque_scale();
-    let (lasting, others): (Vec<&Active>, Vec<&Active>) = fit.actives.iter().partition(lasts);
-    let feels = |joint: usize| {
-        let only = |active: &&&Active| {
-            active
-                .hypothesis
-                .only_joint()
-                .is_none_or(|own| own == joint)
-        };
-        lasting.iter().any(|active| only(&active))
-    };
-    let others = others.into_iter().cloned().collect();
-    let without = Fit::beside(problem, others, Some(fit));
-    let Some(without) = left_out(problem, space, &without, efforts) else {
-        return Vec::new();
-    };
-    let square =
-        |of_joint: &[DVector<f64>]| of_joint.iter().map(DVector::norm_squared).sum::<f64>();
-    let joints = (0..problem.joints).filter(|joint| feels(*joint));
-    joints
-        .filter(|&joint| square(&residuals[joint]) >= square(&without[joint]))
-        .collect()
 }
 
 #[cfg(test)]

@@ -59,7 +59,7 @@ fn units(report: &Report) -> Option<&'static str> {
 /// How the shares of the findings are to be read, where they do not add up to what the correction takes.
 fn shares(report: &Report) -> Option<Markup> {
     /// Shares that come to this part of what went add up, as far as a reader sees.
-    /// Tuned: by hand, for the words of the page; no number depends on it.
+    /// Layout: by eye; no number depends on it.
     const MOST: f64 = 0.8;
     let left = error_left(&report.holdout_rms_before, &report.holdout_rms_after);
     let gone = 1.0 - left * left;

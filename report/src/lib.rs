@@ -36,7 +36,7 @@ pub const STYLE: &str = include_str!("style.css");
 pub const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
 
 /// A verdict with more characters than this is set smaller.
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const LONG: usize = 130;
 
 /// What the page tells beside the report. Paths are as the reader would type them; what is not there is left out.

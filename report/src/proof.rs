@@ -8,7 +8,7 @@ use super::number_format::{fixed, number_text, percent};
 use tauscope_explain::report::{Located, Report, Verdict};
 
 /// How many rows of a table are shown at once.
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const ROWS: usize = 6;
 
 /// A joint with an error below this many times its noise is at the noise floor.

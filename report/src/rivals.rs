@@ -11,7 +11,7 @@ use super::proof;
 use tauscope_explain::report::{NextMotion, Rejected, Report, Undetectable, Verdict};
 
 /// How many rejected rivals the line names.
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const NAMES: usize = 4;
 
 /// The rivals that were considered in one line; what spoke against each is folded away.

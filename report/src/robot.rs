@@ -11,25 +11,25 @@ use super::number_format::number_text;
 use tauscope_explain::report::{RecordingPicture, Report};
 
 /// The picture's width and height \[px\].
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const SIZE: [f64; 2] = [460.0, 330.0];
 /// The part of it that the arm has \[px\].
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const ARM: [f64; 2] = [210.0, 280.0];
 /// Room around the arm \[px\].
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const MARGIN: f64 = 24.0;
 /// Radius of a joint's disc \[px\].
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const DISC: f64 = 9.0;
 /// The least distance of two discs \[px\].
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const APART: f64 = 21.0;
 /// How far from above the arm is looked at \[rad\].
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const ELEVATION: f64 = 0.25;
 /// How many places get a label.
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const LABELS: usize = 6;
 
 /// A point of the picture \[px\].
@@ -262,7 +262,7 @@ fn heat(group: &Group<'_>, largest: f64) -> String {
 
 fn label(group: &Group<'_>, y: f64, unit: &str) -> Markup {
     /// Longest text that is shown whole.
-    /// Tuned: by eye, for the layout of the page.
+    /// Layout: by eye; no number depends on it.
     const LETTERS: usize = 27;
     let x = r(ARM[0] + 2.0 * MARGIN + 8.0);
     let what: Vec<String> = group

@@ -15,7 +15,7 @@ use tauscope_explain::report::{Finding, NextMotion, Report, Rival, Verdict};
 use tauscope_explain::report::{UNCHANGED, error_left};
 
 /// How many parts a mechanic is sent to.
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const PARTS: usize = 4;
 
 /// The box.

@@ -8,16 +8,16 @@ use super::proof::{Row, rows};
 use tauscope_explain::report::{Finding, JointPicture, RecordingPicture, Report};
 
 /// How many joints are shown without a click.
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const OPEN: usize = 5;
 /// How many dots a scatter shows of each kind.
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const DOTS: usize = 900;
 /// Share of the dots at each end that may lie outside the axis of a scatter.
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const WILD: f64 = 0.004;
 /// Left and right end of the plots over time \[px\].
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const TIME_PX: [f64; 2] = [66.0, 950.0];
 
 /// All joints: those with findings or a large change first, the others folded away.

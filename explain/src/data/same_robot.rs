@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::data::problem::Problem;
-use crate::read::audit::MOVES;
+use crate::data::track::STANDSTILL_RAD_S;
 
 /// A joint is compared if the standard deviation of its twin's effort is at least this many times the noise.
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -76,7 +76,7 @@ fn regression(problem: &Problem, joint: usize) -> (f64, f64, f64) {
         for (row, &k) in track.rows().zip(&track.compared) {
             if problem.weight[rows.start + row] > 0.0 {
                 let velocity = track.track.velocity[k * n + joint];
-                let sign = if velocity.abs() < MOVES {
+                let sign = if velocity.abs() < STANDSTILL_RAD_S {
                     0.0
                 } else {
                     velocity.signum()

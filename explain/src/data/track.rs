@@ -19,7 +19,7 @@ const LEAST_MOVING_SHARE: f64 = 0.2;
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const BEGINNING_S: f64 = 1.0;
 /// Thinned samples may be this much closer than the step, as a share of it, on an uneven clock.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Resolution: an uneven clock keeps nearly its samples.
 const LEAST_OF_STEP: f64 = 0.9;
 
 /// One recording in a fit. Matrices are row-major: one number per joint and sample.

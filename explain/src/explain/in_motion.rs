@@ -10,6 +10,7 @@ use crate::data::same_robot::Likeness;
 use crate::explain::judged::{Judged, Stop};
 use crate::fit::consistent_bodies::make_consistent;
 use crate::fit::fitted::Fit;
+use crate::fit::least_squares::weighted_dot;
 use crate::inference;
 use crate::physics::active::Active;
 use crate::physics::{library, torque_scale};
@@ -40,7 +41,7 @@ impl Context<'_> {
         let say = |text: &str| progress(0.1, text);
         let inferred = inference::infer(&problem, &hypotheses, start, input.bodies, &say);
         progress(0.8, "wording the findings");
-        let before = torque_scale::fitted(&problem, &self.unscaled);
+        let before = scaled(&problem, &self.unscaled);
         let named = findings::of(&problem, &inferred, &before, self, &joints);
         let undetectable = findings::undetectable(&inferred.smallest, self, &joints);
         // A twin that is corrected has the bodies' mean changes, too, which are too small for a finding.
@@ -102,6 +103,20 @@ impl Context<'_> {
             None => Ok(None),
         }
     }
+}
+
+/// The twin with its unknown torque scales, those by least squares: recorded effort over that of the bodies.
+fn scaled(problem: &Problem, first: &[(usize, f64)]) -> Fit {
+    let fit = Fit::new(problem, torque_scale::unknown_scales(first));
+    let mut actives = fit.actives.clone();
+    for (active, column) in actives.iter_mut().zip(fit.jacobian(problem)) {
+        let rows = problem.joint_rows(active.hypothesis.place.joint);
+        let weight = &problem.weight[rows.clone()];
+        let square = weighted_dot(weight, &column.values, &column.values);
+        let product = weighted_dot(weight, &column.values, &fit.residual[rows]);
+        active.coordinates[0] += product / square.max(f64::MIN_POSITIVE);
+    }
+    Fit::new(problem, actives)
 }
 
 /// Adds changes of bodies to effects: to the body that was found of a link, if there is one.

@@ -125,7 +125,7 @@ impl Fit {
     pub fn own_efforts(&self, problem: &Problem) -> &[Column] {
         let all: Vec<usize> = (0..self.actives.len()).collect();
         let of = |&index: &usize| {
-            let less = self.without(problem, index);
+            let less = self.without(problem, &[index]);
             let joint = self.actives[index].hypothesis.only_joint();
             let rows = joint.map_or(0..problem.joints * problem.rows, |j| problem.joint_rows(j));
             let pairs = less.residual[rows.clone()].iter().zip(&self.residual[rows]);
@@ -135,11 +135,12 @@ impl Fit {
         self.own.get_or_init(|| parallel::map(&all, of))
     }
 
-    /// The fit without one of its effects, not refined.
+    /// The fit without some of its effects, not refined.
     #[must_use]
-    pub fn without(&self, problem: &Problem, index: usize) -> Self {
-        let mut actives = self.actives.clone();
-        actives.remove(index);
+    pub fn without(&self, problem: &Problem, indices: &[usize]) -> Self {
+        let all = self.actives.iter().enumerate();
+        let kept = all.filter(|(index, _)| !indices.contains(index));
+        let actives = kept.map(|(_, active)| active.clone()).collect();
         Self::beside(problem, actives, Some(self))
     }
 }

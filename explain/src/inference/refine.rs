@@ -101,6 +101,21 @@ pub fn refine(
     }
 }
 
+/// Covariance of all coordinates of a fit, in the order of [`Fit::parameters`]. `deviations` as in [`refine`].
+pub fn covariance(problem: &Problem, space: &Space, fit: &Fit, deviations: &[f64]) -> DMatrix<f64> {
+    let jacobian = fit.jacobian(problem);
+    let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
+    let residual = Column {
+        joint: None,
+        values: fit.residual.clone(),
+    };
+    let mut normal = space.products(&columns, &residual).normal;
+    for (i, precision) in precisions(deviations).iter().enumerate() {
+        normal[(i, i)] += precision;
+    }
+    inverse(&normal)
+}
+
 /// Precisions of priors with these standard deviations.
 fn precisions(deviations: &[f64]) -> DVector<f64> {
     let of = |d: &f64| if d.is_finite() { 1.0 / (d * d) } else { 0.0 };

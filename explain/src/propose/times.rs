@@ -9,11 +9,11 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::CoordinateKind;
 
-use crate::data::column::Column;
+use crate::data::column::{Column, Columns};
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
-use crate::physics::active::{Hypothesis, TimeKind};
-use crate::propose::intervals::{SAME_STEPS, STEPS, intervals};
+use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::propose::intervals::{STEPS, intervals};
 
 /// Times that are kept of each effect. Resolution: the objective decides among them; more change the computing time.
 const KEPT: usize = 3;
@@ -31,6 +31,9 @@ const BESIDE_S: f64 = 0.02;
 /// So long before the session and after it nothing changes \[s\].
 /// Resolution: longer than any session, so that a recording that is held out lies within.
 const FOR_GOOD_S: f64 = 1e6;
+/// Changes that are at most this many steps apart are the same.
+/// Resolution: refinement makes one time of both.
+const SAME_STEPS: usize = 4;
 /// Added to the diagonal of an interval's normal equations, as a share of their trace.
 /// Resolution: guards the factorisation of dependent columns.
 const RIDGE: f64 = 1e-9;
@@ -38,18 +41,7 @@ const RIDGE: f64 = 1e-9;
 /// The most promising shapes of an effect that depends on time, the best first: its times, with the factors at zero.
 pub fn shapes(problem: &Problem, fit: &Fit, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
     let count = hypothesis.effect.coordinates.len();
-    let is_time = |c: &usize| {
-        matches!(
-            hypothesis.effect.coordinates[*c].kind,
-            CoordinateKind::RecordingTime | CoordinateKind::SessionTime
-        )
-    };
-    let at: Vec<usize> = (0..count).filter(is_time).collect();
-    let mut always = vec![0.0; count];
-    for (c, value) in at.iter().zip([f64::NEG_INFINITY, f64::INFINITY]) {
-        always[*c] = value;
-    }
-    let columns = fit.columns(problem, hypothesis, &always);
+    let (columns, at) = always(problem, fit, hypothesis);
     let all = &columns.factors[..];
     let scan = Scan { problem, fit };
     let traits = &hypothesis.effect.traits;
@@ -76,6 +68,59 @@ pub fn shapes(problem: &Problem, fit: &Fit, hypothesis: Hypothesis) -> Vec<Vec<f
         shape
     };
     times.into_iter().map(with).collect()
+}
+
+/// By how much the best factors of an effect reduce the squares of a fit if it acts in an interval of recording time, of one
+/// recording \[s\].
+pub fn gain(
+    problem: &Problem,
+    fit: &Fit,
+    hypothesis: Hypothesis,
+    track: usize,
+    interval_s: (f64, f64),
+) -> f64 {
+    let (columns, _) = always(problem, fit, hypothesis);
+    let time_s = &problem.tracks[track].track.time_s;
+    let (from_s, to_s) = interval_s;
+    // Before it, within it, and after it.
+    let bin_of = |_, k: usize| usize::from(time_s[k] >= from_s) + usize::from(time_s[k] >= to_s);
+    let scan = Scan { problem, fit };
+    let sums = scan.sums(&columns.factors, &[track], 3, bin_of);
+    sums.gain(&(1..2))
+}
+
+/// The columns of an effect that acts all the time, and which of its coordinates are times.
+fn always(problem: &Problem, fit: &Fit, hypothesis: Hypothesis) -> (Arc<Columns>, Vec<usize>) {
+    let count = hypothesis.effect.coordinates.len();
+    let is_time = |c: &usize| {
+        matches!(
+            hypothesis.effect.coordinates[*c].kind,
+            CoordinateKind::RecordingTime | CoordinateKind::SessionTime
+        )
+    };
+    let at: Vec<usize> = (0..count).filter(is_time).collect();
+    let mut shape = vec![0.0; count];
+    for (c, value) in at.iter().zip([f64::NEG_INFINITY, f64::INFINITY]) {
+        shape[*c] = value;
+    }
+    (fit.columns(problem, hypothesis, &shape), at)
+}
+
+/// The effect in an interval of recording time of one recording \[s\], with its factors at zero.
+pub fn within(
+    problem: &Problem,
+    hypothesis: Hypothesis,
+    track: usize,
+    (from_s, to_s): (f64, f64),
+) -> Active {
+    let session_s = problem.tracks[track].track.session_s;
+    let count = hypothesis.effect.coordinates.len();
+    let mut coordinates = vec![0.0; count];
+    let times = (0..count).filter(|c| !hypothesis.factors().contains(c));
+    for (c, time_s) in times.zip([from_s, to_s]) {
+        coordinates[c] = session_s + time_s;
+    }
+    hypothesis.with(coordinates)
 }
 
 /// The candidates with the largest gains, of those that are near to each other only the best.
@@ -182,7 +227,8 @@ impl Scan<'_> {
             let gain = sums.gain(&(steps.from..steps.to));
             (gain, (gain, steps))
         });
-        let kept = best(scored, |a, b| a.1.is_near(&b.1)).into_iter();
+        // What overlaps with the best is another guess at the same.
+        let kept = best(scored, |a, b| a.1.overlaps(&b.1)).into_iter();
         let session_s = only.map_or(0.0, |track| problem.tracks[track].track.session_s);
         let at_s = |step: usize| session_s + step as f64 * bin_s;
         kept.map(|(gain, steps)| (gain, vec![at_s(steps.from), at_s(steps.to)]))

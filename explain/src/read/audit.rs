@@ -5,13 +5,7 @@ use tauscope_session::by_recording;
 use crate::read::input::Input;
 use crate::read::recording::Recording;
 
-/// A joint that is faster than this counts as moving \[rad/s or m/s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-pub const MOVES: f64 = 0.02;
-/// A verdict needs a joint that moves for at least this long \[s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-const LEAST_MOTION_S: f64 = 1.0;
-/// That joint must move further than this in some recording, because a push bends even an arm that holds still
+/// A joint moves if it does so further than this in some recording: a push bends even an arm that holds still
 /// \[rad or m\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_RANGE: f64 = 0.05;
@@ -21,10 +15,6 @@ const LEAST_SAMPLES: usize = 50;
 /// A recording shorter than this is too short \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_DURATION_S: f64 = 1.0;
-/// Speed is the change of position over this time, so that encoder noise does not count as motion \[s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-const SPEED_SPAN_S: f64 = 0.1;
-
 /// The reason why these recordings allow no verdict, if there is one. Nothing has been fitted yet.
 pub fn before(input: &Input) -> Option<String> {
     if let Some(recording) = input.fit.iter().find(|r| r.effort.is_empty()) {
@@ -58,11 +48,11 @@ pub fn before(input: &Input) -> Option<String> {
     None
 }
 
-/// Whether no joint moves long and far enough for a verdict on lasting effects.
+/// Whether no joint moves far enough for a verdict on lasting effects.
 pub fn at_rest(input: &Input) -> bool {
     let n = input.model.dof();
     let stays = |j: usize| input.fit.iter().all(|r| range(r, j, n) < LEAST_RANGE);
-    (0..n).all(|j| moving_s(&input.fit, j, n) < LEAST_MOTION_S || stays(j))
+    (0..n).all(stays)
 }
 
 /// Whether no position ever changes, not even by one encoder step: the driver does not publish positions.
@@ -83,24 +73,6 @@ fn range(recording: &Recording, joint: usize, n: usize) -> f64 {
     let ends = (f64::INFINITY, f64::NEG_INFINITY);
     let (low, high) = positions.fold(ends, |(low, high), q| (low.min(*q), high.max(*q)));
     high - low
-}
-
-/// How long a joint moves \[s\].
-fn moving_s(recordings: &[Recording], joint: usize, n: usize) -> f64 {
-    let mut sum = 0.0;
-    for recording in recordings {
-        let rate = recording.len() as f64 / recording.duration_s().max(1e-3);
-        let reach = ((SPEED_SPAN_S * rate) as usize).max(1);
-        for k in reach..recording.len() {
-            let change =
-                recording.position[k * n + joint] - recording.position[(k - reach) * n + joint];
-            let passed = recording.time_s[k] - recording.time_s[k - reach];
-            if change.abs() > MOVES * passed {
-                sum += recording.time_s[k] - recording.time_s[k - 1];
-            }
-        }
-    }
-    sum
 }
 
 /// Faults of each recording, a sentence each: the findings on reading, the unused parts, and the clock that stamps were

@@ -3,7 +3,7 @@
 use crate::read::recording::Recording;
 
 /// A longer session is fitted in excerpts \[s\].
-/// Tuned: for what it costs in time, on no recorded seeds; not swept.
+/// Resolution: bounds the computing time.
 const LONGEST_S: f64 = 400.0;
 /// How long an excerpt is \[s\].
 /// Physical: some strokes of a pick-and-place motion, between rests.

@@ -13,11 +13,11 @@ use crate::report::schema::{JointPicture, RecordingPicture};
 
 /// Cutoffs that are tried for the motion of a prediction, as shares of the fit's cutoff. The best on the fitted
 /// recordings is used.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Resolution: steps of about 1.4; the fitted recordings decide.
 const PREDICTION_CUTOFFS: [f64; 5] = [0.75, 1.0, 1.4, 2.0, 3.0];
 /// Cutoffs that are tried for the velocity of friction, as multiples of the motion's cutoff. The recorded velocity is
 /// tried, too: friction depends on the sign of velocities of a few mrad/s.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Resolution: octaves; the fitted recordings decide.
 const VELOCITY_CUTOFFS: [f64; 3] = [2.0, 4.0, 8.0];
 /// Highest cutoff of the velocity, as a share of the sample rate.
 /// Physical: below half the sample rate, the Nyquist frequency.

@@ -13,7 +13,7 @@ use crate::physics::parameter_units::unit;
 /// The likelihood ratio of a lead in nats as text, e.g. `40`, `10^17`.
 pub fn odds(nats: f64) -> String {
     /// From here on powers of ten are easier to read.
-    /// Tuned: by eye.
+    /// Layout: by eye; no number depends on it.
     const MANY: f64 = 1000.0;
     let odds = nats.max(0.0).exp();
     if odds < MANY {

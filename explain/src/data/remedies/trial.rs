@@ -9,8 +9,8 @@ use tauscope_dynamics::{Data, Inertia, Link, Model, rnea};
 use super::{Reading, Remedy, SUSPECT};
 use crate::data::efforts::TrackEfforts;
 use crate::data::problem::Problem;
+use crate::data::track::STANDSTILL_RAD_S;
 use crate::data::track::Track;
-use crate::read::audit::MOVES;
 
 /// A joint tells if its effort varies by at least this many times the noise, and is compared with this many rows.
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -305,7 +305,7 @@ fn friction(rows: &[Counted], factor: f64) -> DMatrix<f64> {
         match column {
             0 => 1.0,
             // As recorded, so that each reading has the same standstills.
-            1 if rows[row].velocity.abs() < MOVES => 0.0,
+            1 if rows[row].velocity.abs() < STANDSTILL_RAD_S => 0.0,
             1 => velocity.signum(),
             _ => velocity,
         }
