@@ -11,5 +11,6 @@
 pub mod curve_axes;
 pub mod grid;
 mod intervals;
+mod running_sums;
 pub mod times;
 pub mod wall;

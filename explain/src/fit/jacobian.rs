@@ -40,7 +40,7 @@ impl Fit {
         matches!(self.actives[index].kind(c), CoordinateKind::Factor { .. })
     }
 
-    /// How the explained effort changes with the coordinates of an active.
+    /// Derivatives of the explained effort with respect to the coordinates of an active.
     fn sensitivities(&self, problem: &Problem, index: usize) -> Vec<Arc<Column>> {
         let active = &self.actives[index];
         let hypothesis = active.hypothesis;

@@ -1,4 +1,4 @@
-//! What the effects of a fit predict in pieces of recordings that are left out of it.
+//! Predictions of a fit's effects in pieces of recordings that are left out of it.
 
 use nalgebra::DVector;
 

@@ -20,10 +20,12 @@ use super::space::Space;
 use super::temper;
 use super::variants::{self, Given};
 
-/// Candidate scales of the errors of bodies, in usual errors. Resolution: of an estimate that some ten bodies allow.
-const BODY_SCALES: [f64; 5] = [0.1, 0.3, 0.55, 1.0, 1.8];
-/// Candidate scales of the errors of laws, in usual errors. Chosen: no law is truer than one percent of a joint's effort.
-const LAW_SCALES: [f64; 2] = [0.55, 1.0];
+/// Factor between two scales of the errors of bodies or laws that are compared. Resolution: of an estimate that some ten
+/// bodies allow.
+const SCALE_STEP: f64 = 1.8;
+/// Least and largest scale of the errors of bodies, and of laws, in usual errors. Chosen: a URDF that a hand has written may be
+/// off ten times as far as usual, and no law is truer than one percent of a joint's effort.
+const SCALES: [[f64; 2]; 2] = [[0.1, 1.8], [0.55, 1.0]];
 /// Weight of the usual errors against an estimate: twice the squared logarithm of the scale is taken off \[nats\].
 /// Chosen: a normal prior on the logarithm with a standard deviation of one half.
 const SCALE_WEIGHT: f64 = 2.0;
@@ -151,21 +153,19 @@ impl<'a> State<'a> {
             space.evidence(&measured) + own.score(&all) - disfavour(scales)
         };
         for which in (0..2).filter(|which| *which == 1 || self.bodies) {
-            let with = |scale: f64| {
-                let mut scales = self.scales;
-                scales[which] = scale;
-                scales
-            };
-            let scales: &[f64] = if which == 0 {
-                &BODY_SCALES
-            } else {
-                &LAW_SCALES
-            };
-            let all = scales
-                .iter()
-                .map(|scale| (value(self, with(*scale)), with(*scale)));
-            let best = all.max_by(|a, b| a.0.total_cmp(&b.0));
-            self.scales = best.map_or(self.scales, |(_, scales)| scales);
+            let [least, largest] = SCALES[which];
+            let mut best = value(self, self.scales);
+            for factor in [SCALE_STEP, 1.0 / SCALE_STEP] {
+                loop {
+                    let mut scales = self.scales;
+                    scales[which] = (factor * scales[which]).clamp(least, largest);
+                    let next = value(self, scales);
+                    if next <= best {
+                        break;
+                    }
+                    (best, self.scales) = (next, scales);
+                }
+            }
         }
     }
 

@@ -6,7 +6,6 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::CoordinateKind;
 
 use crate::data::column::{Column, Columns};
@@ -14,6 +13,7 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::propose::intervals::{STEPS, intervals};
+use crate::propose::running_sums::Sums;
 
 /// Times that are kept of each effect. Resolution: the objective decides among them; more change the computing time.
 const KEPT: usize = 3;
@@ -22,22 +22,15 @@ const SHORTEST_PERIODS: f64 = 3.0;
 /// Shortest and longest step on which the ends of short intervals are searched \[s\]. Resolution: half the step costs four
 /// times the time; times are refined afterwards.
 const STEP_S: [f64; 2] = [0.05, 0.1];
-/// Factors that are scanned. The inertias of a payload come after them and hardly change the effort.
-/// Physical: a payload's mass and first moments of mass.
-const SCANNED_FACTORS: usize = 4;
-/// An effect of a whole recording begins so long before it and ends so long after it \[s\].
+/// Time before a recording at which an effect of the whole recording begins, and after it at which it ends \[s\].
 /// Resolution: the ends lie where no row is.
 const BESIDE_S: f64 = 0.02;
-/// So long before the session and after it nothing changes \[s\].
+/// Time before and after the session at which an effect begins or ends that does not change in it \[s\].
 /// Resolution: longer than any session, so that a recording that is held out lies within.
 const FOR_GOOD_S: f64 = 1e6;
 /// Changes that are at most this many steps apart are the same.
 /// Resolution: refinement makes one time of both.
 const SAME_STEPS: usize = 4;
-/// Added to the diagonal of an interval's normal equations, as a share of their trace.
-/// Resolution: guards the factorisation of dependent columns.
-const RIDGE: f64 = 1e-9;
-
 /// The most promising shapes of an effect that depends on time, the best first: its times, with the factors at zero.
 pub fn shapes(problem: &Problem, fit: &Fit, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
     let count = hypothesis.effect.coordinates.len();
@@ -70,8 +63,7 @@ pub fn shapes(problem: &Problem, fit: &Fit, hypothesis: Hypothesis) -> Vec<Vec<f
     times.into_iter().map(with).collect()
 }
 
-/// By how much the best factors of an effect reduce the squares of a fit if it acts in an interval of recording time, of one
-/// recording \[s\].
+/// Reduction of the squares of a fit by the best factors of an effect that acts in an interval of one recording \[s\].
 pub fn gain(
     problem: &Problem,
     fit: &Fit,
@@ -84,8 +76,7 @@ pub fn gain(
     let (from_s, to_s) = interval_s;
     // Before it, within it, and after it.
     let bin_of = |_, k: usize| usize::from(time_s[k] >= from_s) + usize::from(time_s[k] >= to_s);
-    let scan = Scan { problem, fit };
-    let sums = scan.sums(&columns.factors, &[track], 3, bin_of);
+    let sums = Sums::new((problem, fit), &columns.factors, &[track], 3, bin_of);
     sums.gain(&(1..2))
 }
 
@@ -136,81 +127,19 @@ fn best<T>(all: impl Iterator<Item = (f64, T)>, is_near: impl Fn(&T, &T) -> bool
     kept
 }
 
-/// Normal equations of some columns, summed over the rows of all bins before each.
-struct Sums {
-    gram: Vec<DMatrix<f64>>,
-    right: Vec<DVector<f64>>,
-}
-
-impl Sums {
-    /// By how much the best factors of these bins reduce the squares.
-    fn gain(&self, bins: &Range<usize>) -> f64 {
-        let mut normal = &self.gram[bins.end] - &self.gram[bins.start];
-        let right = &self.right[bins.end] - &self.right[bins.start];
-        let ridge = RIDGE * normal.trace() + f64::MIN_POSITIVE;
-        for a in 0..right.len() {
-            normal[(a, a)] += ridge;
-        }
-        let factor = normal.cholesky();
-        factor.map_or(f64::NEG_INFINITY, |factor| right.dot(&factor.solve(&right)))
-    }
-}
-
-/// A scan over the times of recordings, beside a fit.
+/// A scan over the times of recordings for what a fit leaves.
 struct Scan<'a> {
     problem: &'a Problem,
     fit: &'a Fit,
 }
 
 impl Scan<'_> {
-    /// Sums over bins; `bin_of` says which one a sample of a track is in.
-    fn sums(
-        &self,
-        columns: &[Arc<Column>],
-        tracks: &[usize],
-        bins: usize,
-        bin_of: impl Fn(usize, usize) -> usize,
-    ) -> Sums {
-        let problem = self.problem;
-        let columns = &columns[..columns.len().min(SCANNED_FACTORS)];
-        let q = columns.len();
-        let mut gram = vec![DMatrix::<f64>::zeros(q, q); bins + 1];
-        let mut right = vec![DVector::<f64>::zeros(q); bins + 1];
-        for &r in tracks {
-            let track = &problem.tracks[r];
-            for (row, &k) in track.rows().zip(&track.compared) {
-                let bin = bin_of(r, k) + 1;
-                for j in 0..problem.joints {
-                    let at = j * problem.rows + row;
-                    let weight = problem.weight[at] / self.fit.variance[j];
-                    if weight == 0.0 {
-                        continue;
-                    }
-                    let value = |c: &Arc<Column>| {
-                        let own = c.of_joint(j, problem.rows);
-                        own.map_or(0.0, |values| values[row])
-                    };
-                    let x: DVector<f64> = DVector::from_iterator(q, columns.iter().map(value));
-                    gram[bin].ger(weight, &x, &x, 1.0);
-                    right[bin].axpy(weight * self.fit.residual[at], &x, 1.0);
-                }
-            }
-        }
-        for bin in 1..=bins {
-            let (before, here) = gram.split_at_mut(bin);
-            here[0] += &before[bin - 1];
-            let (before, here) = right.split_at_mut(bin);
-            here[0] += &before[bin - 1];
-        }
-        Sums { gram, right }
-    }
-
     /// Beginning and end of intervals of recording time, in one recording or in all \[s; of one recording in session time\].
     fn intervals(&self, columns: &[Arc<Column>], only: Option<usize>) -> Vec<Vec<f64>> {
         best(self.ranked(columns, only).into_iter(), |_, _| false)
     }
 
-    /// The same with their gains, the best first.
+    /// Such intervals with their gains, best first.
     fn ranked(&self, columns: &[Arc<Column>], only: Option<usize>) -> Vec<(f64, Vec<f64>)> {
         let problem = self.problem;
         let all: Vec<usize> = (0..problem.tracks.len()).collect();
@@ -219,7 +148,7 @@ impl Scan<'_> {
         let bin_s = (longest_s / STEPS as f64).clamp(STEP_S[0], STEP_S[1]);
         let bins = (longest_s / bin_s).ceil() as usize + 1;
         let bin_of = |r: usize, k: usize| (problem.tracks[r].track.time_s[k] / bin_s) as usize;
-        let sums = self.sums(columns, &tracks, bins, bin_of);
+        let sums = Sums::new((problem, self.fit), columns, &tracks, bins, bin_of);
         let shortest_s = SHORTEST_PERIODS / problem.cutoff_hz;
         let shortest = ((shortest_s / bin_s).ceil() as usize).max(1);
         let scored = intervals(bins, shortest).into_iter();
@@ -227,7 +156,7 @@ impl Scan<'_> {
             let gain = sums.gain(&(steps.from..steps.to));
             (gain, (gain, steps))
         });
-        // What overlaps with the best is another guess at the same.
+        // An interval that overlaps with the best describes the same event.
         let kept = best(scored, |a, b| a.1.overlaps(&b.1)).into_iter();
         let session_s = only.map_or(0.0, |track| problem.tracks[track].track.session_s);
         let at_s = |step: usize| session_s + step as f64 * bin_s;
@@ -305,12 +234,12 @@ impl Scan<'_> {
             place[r] * STEPS + step.min(STEPS - 1)
         };
         let bins = order.len() * STEPS;
-        let sums = self.sums(columns, &order, bins, bin_of);
+        let sums = Sums::new((self.problem, self.fit), columns, &order, bins, bin_of);
         let steps = order.iter().map(|&r| (session_s(r), step_s(r))).collect();
         (Session { order, bins, steps }, sums)
     }
 
-    /// How long a recording lasts \[s\].
+    /// Duration of a recording \[s\].
     fn length_s(&self, track: usize) -> f64 {
         let time_s = &self.problem.tracks[track].track.time_s;
         time_s.last().copied().unwrap_or(0.0)

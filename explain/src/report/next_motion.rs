@@ -35,7 +35,7 @@ const STEP_S: f64 = 0.01;
 /// The slowest speed of a creeping joint \[rad/s or m/s\].
 /// Physical: twice what counts as standstill, and well below usual Stribeck velocities.
 const CREEP: f64 = 0.02;
-/// How many speeds a creeping joint has, and each over the one before.
+/// Number of speeds of a creeping joint, and ratio of each to the one before.
 /// Resolution: evenly by logarithm from creeping to half a rad/s.
 const SPEEDS: usize = 5;
 const FASTER: f64 = 2.2;

@@ -87,7 +87,7 @@ pub fn factors(
     (0..p).map(|a| theta[a] / scale[a]).collect()
 }
 
-/// How many independent rows say as much as all with weight: `n (1 - r) / (1 + r)` with r the correlation of neighbouring
+/// Effective number of independent rows among those with weight: `n (1 - r) / (1 + r)` with r the correlation of neighbouring
 /// rows (Bayley and Hammersley, "The 'Effective' Number of Independent Observations in an Autocorrelated Time Series",
 /// 1946).
 pub fn independent_rows(left: &[f64], weight: &[f64]) -> f64 {

@@ -112,7 +112,7 @@ mod tests {
     use crate::fixture::problem_with;
     use crate::physics::active::{Hypothesis, Whereabouts};
 
-    /// Guards against a push that grows and fades, which was told as one push on top of another.
+    /// Guards against several findings for one push that grows and fades.
     #[test]
     fn boxes_that_overlap_are_one_push() {
         let problem = problem_with(3, |_, _, _| {});
@@ -132,7 +132,7 @@ mod tests {
         assert_eq!(parts(&fit, 2), [0, 2]);
         assert_eq!(parts(&fit, 1), [1]);
         let mut covariance = DMatrix::identity(15, 15);
-        // What one box has too much, the other has too little.
+        // Of two boxes that overlap only the sum is well known.
         covariance[(0, 10)] = -0.9;
         covariance[(10, 0)] = -0.9;
         let (whole, deviations) = joined(&problem, &fit, &covariance, &[0, 2]);
