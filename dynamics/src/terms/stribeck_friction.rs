@@ -6,6 +6,11 @@ use super::{
     Simulated, Traits, Words, sign,
 };
 
+/// Least and largest Stribeck velocity \[rad/s\].
+/// Physical: full lubrication begins near 9 rad/s of a motor (Bittencourt and Gunnarsson, "Static Friction in a Robot
+/// Joint", *Journal of Dynamic Systems, Measurement, and Control* 134, 2012), and gears of arms reduce by ten or more.
+const SPEEDS_RAD_S: [f64; 2] = [0.02, 1.0];
+
 /// Effort (Fc + (Fs - Fc) exp(-(qd/vs)²)) sgn(qd) (Armstrong-Hélouvry, Dupont and Canudas de Wit, "A
 /// survey of models, analysis tools and compensation methods for the control of machines with
 /// friction", 1994, equation 2, with the exponent 2).
@@ -30,7 +35,13 @@ pub(super) static EFFECT: Effect = Effect {
     coordinates: &[
         Coordinate::positive_factor("coulomb_nm"),
         Coordinate::positive_factor("static_excess_nm"),
-        Coordinate::shape("stribeck_velocity_rad_s", 0.02, 5.0, 12, Scale::Log),
+        Coordinate::shape(
+            "stribeck_velocity_rad_s",
+            SPEEDS_RAD_S[0],
+            SPEEDS_RAD_S[1],
+            9,
+            Scale::Log,
+        ),
     ],
     to_parameters: |c| vec![c[0], c[0] + c[1], c[2]],
     to_coordinates: |p| vec![p[0], p[1] - p[0], p[2]],
