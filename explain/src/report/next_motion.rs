@@ -232,7 +232,7 @@ fn position(model: &Model, excite: Excite, joint: usize, centre: &[f64], j: usiz
         Excite::WholeRange if !own => return middle,
         Excite::WholeRange | Excite::AllPoses => 2.0 / PART_S,
         Excite::AllSpeeds => 4.0 / PART_S,
-        Excite::Fast => 16.0 / PART_S,
+        Excite::Fast => 8.0 / PART_S,
     };
     middle + fade * wave(base_hz, j, [room, speed, ACCELERATION], t)
 }
