@@ -186,7 +186,7 @@ def main():
             # The first sentence says what is wrong; the others give evidence and remedy.
             brief = said.split(". ")[0] if said else "; ".join(other)
             print(f"| {arm.name} | {slip} | {report['verdict']} | {brief} | {'yes' if good else 'no'} |", flush=True)
-    print(f"\nOf {count} explanations, {right} are right. {alarms} without a slip were said to have one.")
+    print(f"\nOf {count} explanations, {right} are right. False alarms on recordings without a slip: {alarms}.")
 
 
 if __name__ == "__main__":

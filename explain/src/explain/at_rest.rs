@@ -221,7 +221,7 @@ impl Context<'_> {
             actives.extend(inferred.fit.actives);
         }
         if named.findings.is_empty() {
-            let reason = "no joint moves far enough: at rest, friction cannot be told from load";
+            let reason = "no joint moves far enough to separate friction from load";
             return Ok(Err(Stop::Reason(reason.to_owned())));
         }
         named.notes.push(format!(

@@ -105,7 +105,7 @@ impl Context<'_> {
     }
 }
 
-/// The twin with its unknown torque scales, those by least squares: recorded effort over that of the bodies.
+/// The twin with its unknown torque scales by least squares, none negative: recorded effort over that of the bodies.
 fn scaled(problem: &Problem, first: &[(usize, f64)]) -> Fit {
     let fit = Fit::new(problem, torque_scale::unknown_scales(first));
     let mut actives = fit.actives.clone();
@@ -114,7 +114,8 @@ fn scaled(problem: &Problem, first: &[(usize, f64)]) -> Fit {
         let weight = &problem.weight[rows.clone()];
         let square = weighted_dot(weight, &column.values, &column.values);
         let product = weighted_dot(weight, &column.values, &fit.residual[rows]);
-        active.coordinates[0] += product / square.max(f64::MIN_POSITIVE);
+        let gain_minus_one = active.coordinates[0] + product / square.max(f64::MIN_POSITIVE);
+        active.coordinates[0] = gain_minus_one.max(-1.0);
     }
     Fit::new(problem, actives)
 }

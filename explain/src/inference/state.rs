@@ -23,8 +23,8 @@ use super::variants::{self, Given};
 /// Factor between two scales of the errors of bodies or laws that are compared. Resolution: of an estimate that some ten
 /// bodies allow.
 const SCALE_STEP: f64 = 1.8;
-/// Least and largest scale of the errors of bodies, and of laws, in usual errors. Chosen: a URDF that a hand has written may be
-/// off ten times as far as usual, and no law is truer than one percent of a joint's effort.
+/// Least and largest scale of the errors of bodies, and of laws, in usual errors. Chosen: a body that is off by more than
+/// twice the usual error is a finding, and no law is truer than one percent of a joint's effort.
 const SCALES: [[f64; 2]; 2] = [[0.1, 1.8], [0.55, 1.0]];
 /// Weight of the usual errors against an estimate: twice the squared logarithm of the scale is taken off \[nats\].
 /// Chosen: a normal prior on the logarithm with a standard deviation of one half.

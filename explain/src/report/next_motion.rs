@@ -21,7 +21,7 @@ const SHARE: f64 = 0.8;
 /// Physical: a quarter of a turn to either side.
 const DEFAULT_HALF_RANGE: f64 = 1.5;
 /// Speed limit of a joint without one in the URDF \[rad/s or m/s\].
-/// Physical: slower than that of every arm for sale.
+/// Physical: well within the speed of collaborative arms.
 const DEFAULT_SPEED: f64 = 1.0;
 /// Highest acceleration \[rad/s² or m/s²\].
 /// Physical: URDFs give none, and collaborative arms reach it.
