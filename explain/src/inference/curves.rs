@@ -15,10 +15,9 @@ use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis, Whereabouts, held_knots};
 use crate::propose::curve_axes::{curves, knot_columns};
 
-/// Most knots of a curve. Resolution: more cost time and describe nothing that fewer do not.
-const MOST_KNOTS: usize = 16;
-/// Length over which values are correlated, as a share of the range of the knots. Chosen: curves with one bend or two.
-const LENGTH_SHARE: f64 = 0.25;
+/// Length over which values are correlated, in mean distances of the knots.
+/// Resolution: between knots that are farther apart than the length, a curve would be free to do what no knot describes.
+const LENGTH: f64 = 2.0;
 /// Share of the variance that is independent from knot to knot. Chosen: a tenth, so that a curve may have a corner.
 const ROUGH_SHARE: f64 = 0.1;
 
@@ -44,8 +43,9 @@ impl Curve {
         let (low, high) = (free.iter()).fold((f64::MAX, f64::MIN), |(low, high), x| {
             (low.min(*x), high.max(*x))
         });
-        let length = (LENGTH_SHARE * (high - low)).max(f64::MIN_POSITIVE);
         let count = free.len();
+        let distance = (high - low) / (count.max(2) - 1) as f64;
+        let length = (LENGTH * distance).max(f64::MIN_POSITIVE);
         let correlation = DMatrix::from_fn(count, count, |a, b| {
             let smooth = (-0.5 * ((free[a] - free[b]) / length).powi(2)).exp();
             (1.0 - ROUGH_SHARE) * smooth + if a == b { ROUGH_SHARE } else { 0.0 }
@@ -105,7 +105,7 @@ pub fn of_joint(problem: &Problem, fit: &Fit, joint: usize) -> Vec<(Curve, Vec<A
     let mut tables = curves(problem, joint);
     // Friction that follows no law may as well be the other simulation's.
     let is_told = |table: &Table| !(problem.is_foreign && table.by_direction);
-    tables.retain(|table| table.knots.len() <= MOST_KNOTS && is_told(table));
+    tables.retain(is_told);
     let of = |table: Table| {
         let curve = Curve::new(table, hypothesis);
         let free = curve.mixing.nrows();

@@ -27,7 +27,7 @@ const OTHER_FRICTION_SHARE: f64 = 0.2;
 /// sample. Chosen: of the order of a controller's cycle.
 const STAMP_S: f64 = 0.001;
 /// Usual difference between the stamps of effort and position that all joints share \[s\]. Chosen: current controllers and filters of drives take some milliseconds.
-const COMMON_STAMP_S: f64 = 0.004;
+const COMMON_STAMP_S: f64 = 0.002;
 /// Usual width of a filter that the efforts of all joints pass and positions do not, or the reverse \[s\]. Chosen: a
 /// low-pass filter of 20 Hz.
 const COMMON_WIDTH_S: f64 = 0.008;

@@ -11,9 +11,6 @@ use crate::physics::active::Active;
 /// Knots of a curve.
 /// Resolution: of a curve with a few bends.
 const KNOTS: usize = 10;
-/// Knots of a curve over position that resolves a local defect, such as a worn segment of a gear.
-/// Resolution: of a tooth or a dent in a range of two radians.
-const MANY_KNOTS: usize = 28;
 /// Knots that a curve must have at different places.
 /// Statistical: two knots are a straight line, which effects of the library already describe.
 const LEAST_KNOTS: usize = 3;
@@ -72,13 +69,8 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
             add(against, joint, speeds, &[false]);
         }
     }
-    for (against, count) in [
-        (Against::Position, MANY_KNOTS),
-        (Against::Acceleration, KNOTS),
-        (Against::Load, KNOTS),
-        (Against::RecordingTime, KNOTS),
-    ] {
-        add(against, joint, even(against, joint, count), &[false, true]);
+    for against in [Against::Acceleration, Against::Load, Against::RecordingTime] {
+        add(against, joint, even(against, joint, KNOTS), &[false, true]);
     }
     let driven = with_zero(even(Against::DrivenLoad, joint, KNOTS));
     add(Against::DrivenLoad, joint, driven, &[true]);
