@@ -1,11 +1,15 @@
 //! A robot file, read and checked: the one way in which commands open a robot.
 
+mod mjcf;
+
 use std::path::Path;
 
 use tauscope_archive::file_kind;
 use tauscope_dynamics::{
     BodyFinding, BodySeverity, Model, ModelError, check_bodies, with_plausible_bodies,
 };
+
+pub use mjcf::MjcfError;
 
 /// A robot, and what is odd or wrong about its file.
 #[derive(Debug, Clone)]
@@ -27,13 +31,18 @@ pub enum UrdfError {
     /// It is no robot that the algorithms can work on.
     #[error("cannot use the URDF: {0}")]
     Unusable(#[from] ModelError),
+    /// It is a MuJoCo model that cannot be used.
+    #[error("{0}")]
+    Mjcf(#[from] MjcfError),
 }
 
+/// Outermost element of a MuJoCo model.
+const MJCF_ROOT: &str = "mujoco";
 /// Longest file \[bytes\].
 /// Resolution: bounds memory.
 const MAX_BYTES: u64 = 16 << 20;
 
-/// The robot at `path`, with the findings about its file.
+/// The robot at `path`, a URDF or a MuJoCo model, with the findings about its file.
 ///
 /// # Errors
 /// If there is no such file, it is of another kind, or the robot cannot be used.
@@ -53,10 +62,18 @@ pub fn read(path: &Path) -> Result<Robot, UrdfError> {
         })
     })?;
     // Faults of links and joints are reported before those of bodies.
-    let model = Model::from_urdf(&text)?;
+    let (text, model, remarks) = match Model::from_urdf(&text) {
+        Err(ModelError::NotARobot { found, .. }) if found == MJCF_ROOT => {
+            let (urdf, remarks) = mjcf::to_urdf(&text, path)?;
+            let model = Model::from_urdf(&urdf)?;
+            (urdf, model, remarks)
+        }
+        model => (text, model?, Vec::new()),
+    };
     let findings = check_bodies(&text)?;
-    let sentences = findings.iter();
-    let sentences = sentences.map(|finding| format!("{}: {finding}", path.display()));
+    let sentences = findings.iter().map(ToString::to_string);
+    let sentences = remarks.into_iter().chain(sentences);
+    let sentences = sentences.map(|sentence| format!("{}: {sentence}", path.display()));
     let is_impossible = |finding: &BodyFinding| finding.severity == BodySeverity::Impossible;
     let (urdf, model) = if findings.iter().any(is_impossible) {
         let urdf = with_plausible_bodies(&text, &findings)?;

@@ -239,6 +239,12 @@ fn refuse_massless(
                 .iter()
                 .all(|body| body.joint != *joint || body.own.mass == 0.0)
         })
+        // Two joints in one place have a link without mass and shape in between, which carries what the next one moves.
+        .filter(|joint| {
+            let own = links.iter().filter(|link| link.joint == Some(*joint));
+            let is_drawn = own.flat_map(|link| &link.shapes).next().is_some();
+            is_drawn || !carries_mass(bodies, *joint)
+        })
         .collect();
     massless.sort_unstable();
     let Some(&joint) = massless.first() else {
@@ -254,6 +260,21 @@ fn refuse_massless(
         joint: name.clone(),
         links: moved.map(|link| link.name.clone()).collect(),
     })
+}
+
+/// Whether a body that stands on those of a joint has a mass.
+fn carries_mass(bodies: &[Body], joint: usize) -> bool {
+    let mut stands = vec![false; bodies.len()];
+    // Parents come first.
+    for (k, body) in bodies.iter().enumerate() {
+        let on_parent = body
+            .parent
+            .checked_sub(1)
+            .is_some_and(|parent| stands[parent]);
+        stands[k] = body.joint == joint || on_parent;
+    }
+    let mut standing = bodies.iter().zip(stands);
+    standing.any(|(body, stands)| stands && body.own.mass > 0.0)
 }
 
 struct Builder<'a> {
