@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    calibrate, check, cluster, completions, diff, doctor, evaluate, explain, fleet, info, init,
-    man, manifest, physics, query, repair, replay, run, schema, send, simulate, stage, weeks,
+    calibrate, check, cluster, completions, diff, doctor, evaluate, explain, export, fleet, info,
+    init, man, manifest, physics, query, repair, replay, run, schema, send, simulate, stage, weeks,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -32,6 +32,7 @@ pub enum Command {
     Cluster(cluster::Args),
     Calibrate(calibrate::Args),
     Explain(explain::Args),
+    Export(export::Args),
     Evaluate(evaluate::Args),
     Send(send::Args),
     Fleet(fleet::Args),

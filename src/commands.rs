@@ -8,6 +8,7 @@ pub mod diff;
 pub mod doctor;
 pub mod evaluate;
 pub mod explain;
+pub mod export;
 pub mod fleet;
 pub mod info;
 pub mod init;

@@ -5,7 +5,6 @@ mod input;
 mod output;
 mod picture;
 mod read;
-mod robot;
 mod served;
 mod twin;
 mod words;
@@ -37,6 +36,7 @@ fn provenance_of(request: &Request) -> std::io::Result<BTreeMap<String, String>>
     if let Some(path) = &request.robot_path {
         let hash = provenance::sha256_of_file(path)?;
         all.insert("urdf_sha256".to_owned(), hash);
+        all.insert("robot".to_owned(), path.display().to_string());
     }
     if let Some(start) = &request.start {
         all.insert(

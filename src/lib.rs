@@ -132,6 +132,7 @@ fn outcome(command: &Command, out: &mut Output) -> Result<exit::Exit, exit::Fail
         Command::Manifest(args) => commands::manifest::run(args, out),
         Command::Calibrate(args) => commands::calibrate::run(args, out),
         Command::Explain(args) => commands::explain::run(args, out),
+        Command::Export(args) => commands::export::run(args, out),
         Command::Evaluate(args) => commands::evaluate::run(args, out),
         Command::Send(args) => commands::send::run(args, out),
         Command::Fleet(args) => commands::fleet::run(args, out),

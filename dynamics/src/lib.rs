@@ -59,8 +59,9 @@ pub use inertia::{Inertia, PARAMETERS_PER_BODY};
 pub use inertial_effort::InertialEffort;
 pub use kinematics::{forward_kinematics, link_jacobian, link_pose, point_jacobian};
 pub use model::{
-    BodyFault, BodyFinding, BodyPlace, BodySeverity, Follower, Geometry, Joint, JointKind, Limits,
-    Link, Model, ModelError, Shape, Substitute, check_bodies, fix_joints, with_plausible_bodies,
+    BodyFault, BodyFinding, BodyPlace, BodySeverity, Drive, Follower, Geometry, Joint, JointKind,
+    Limits, Link, MUJOCO, Model, ModelError, Shape, Substitute, check_bodies, fix_joints,
+    with_plausible_bodies,
 };
 pub use regressor::regressor;
 pub use rnea::{gravity_effort, rnea};

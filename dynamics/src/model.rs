@@ -6,6 +6,7 @@ use crate::inertia::Inertia;
 
 mod consistency;
 mod document;
+mod drive;
 mod error;
 mod fix;
 mod places;
@@ -17,6 +18,7 @@ pub use consistency::{
     BodyFault, BodyFinding, BodyPlace, BodySeverity, Substitute, check_bodies,
     with_plausible_bodies,
 };
+pub use drive::{Drive, MUJOCO};
 pub use error::ModelError;
 pub use fix::fix_joints;
 pub use shape::{Geometry, Shape};
@@ -57,6 +59,8 @@ pub struct Joint {
     pub axis: [f64; 3],
     /// Its limits as far as the URDF gives them.
     pub limits: Limits,
+    /// What the file says of its drive.
+    pub drive: Drive,
 }
 
 impl Joint {

@@ -19,11 +19,13 @@ mod coulomb_friction;
 mod counterbalance_spring;
 mod delay_line;
 mod displaced;
+mod drive;
 mod drive_deadband;
 mod eccentric_gear;
 mod effect;
 mod encoder_eccentricity;
 mod expansion;
+mod export;
 mod external_push;
 mod friction_drift;
 mod friction_step;
@@ -84,11 +86,13 @@ use crate::{Inertia, Model};
 pub use absent_tool::{EFFECT as ABSENT_TOOL, LEAST_ABSENT, share_of_carried};
 pub use concealed::{Chance, Draw, Drawn, Parameters};
 pub use coulomb_friction::EFFECT as COULOMB_FRICTION;
+pub use drive::of_drives;
 pub use effect::{
     Compliance, Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, Parameter,
     PlaceKind, Scale, Simpler, Simulated, Time, Traits,
 };
 pub use expansion::Expansion;
+pub use export::{Exported, Quantity};
 pub use gauge::Gauge;
 pub use link_com::EFFECT as LINK_COM;
 pub use payload::EFFECT as PAYLOAD;

@@ -193,7 +193,7 @@ fn conclude(
     slips.undo(&mut proof);
     let verdict = verdict::verdict(&findings, &remaining, !input.bodies);
     let errors = [&proof.before[..], &proof.after[..]];
-    let has_changed = input.start.is_some();
+    let has_changed = input.found_before().is_some();
     let summary = summary::summary(verdict, &findings, &remaining, joints, errors, has_changed);
     findings.extend(without_law(input, &remaining, &findings));
     let report = Report {

@@ -13,7 +13,7 @@ use tauscope_dynamics::{Link, Model};
 use tauscope_ingest::{Commanded, IngestError, Paced, Rate, SimulatedRobot, Takes};
 use tauscope_publish::{PublishError, Publisher};
 use tauscope_record::{CellInfo, RecordError, Recorder, StreamInfo};
-use tauscope_twin::{Correction, Twin, TwinFile};
+use tauscope_twin::{Correction, Expected, Twin, TwinFile};
 use tauscope_watch::{self as watch, Watch};
 
 use crate::cell::{Cell, EffortUnit};
@@ -158,7 +158,7 @@ impl Source<JointState> for After {
     }
 }
 
-/// What `model` corrects in `cell`; nothing without one.
+/// What `model` corrects in `cell`; without one, what the robot's file states beside the bodies.
 ///
 /// # Errors
 /// If the model does not fit the cell.
@@ -166,7 +166,10 @@ pub fn correction(model: Option<&TwinFile>, cell: &Cell) -> Result<Correction, B
     let joints = &cell.facts.joint_names;
     Ok(match model {
         Some(model) => model.resolve(joints, cell.facts.effort_unit.as_str())?,
-        None => Correction::none(joints.len()),
+        None => Correction {
+            terms: cell.stated_terms(),
+            ..Correction::none(joints.len())
+        },
     })
 }
 
@@ -186,6 +189,10 @@ pub fn twin(
         tool_link: cell.tool_link(),
     };
     let mut correction = correction(model, cell)?;
+    // Another simulation has the friction of its own file.
+    if model.is_none() && config.expected == Expected::Topic {
+        correction.terms.clear();
+    }
     if config.effort_cutoff_hz.is_some() {
         // One for all joints.
         for joint in &mut correction.joints {

@@ -313,7 +313,10 @@ impl Job<'_> {
             effort_unit: facts.effort_unit.as_str().to_owned(),
             filters: self.twin.filters(None),
             joints: std::collections::BTreeMap::new(),
-            terms: Vec::new(),
+            terms: match self.twin.expected {
+                Expected::Model => self.cell.stated_terms(),
+                Expected::Topic => Vec::new(),
+            },
             scores: std::collections::BTreeMap::new(),
             provenance: std::collections::BTreeMap::new(),
         }

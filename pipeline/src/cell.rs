@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 pub use tauscope_bus::EffortUnit;
 use tauscope_bus::MAX_JOINTS;
 use tauscope_dynamics::Model;
+use tauscope_dynamics::terms::{TermSpec, of_drives};
 
 pub use constants::{ConstantSpot, torque_constants};
 pub use joints::{Fixed, recorded_joint_names};
@@ -122,6 +123,15 @@ impl Cell {
     pub fn effort_limits(&self) -> Vec<Option<f64>> {
         let joints = self.model.iter().flat_map(Model::joints);
         joints.map(|joint| joint.limits.effort).collect()
+    }
+
+    /// Friction, rotors and springs that the robot's file states, where efforts in N m can be told in the measured unit.
+    pub fn stated_terms(&self) -> Vec<TermSpec> {
+        let facts = &self.facts;
+        let is_told =
+            facts.effort_unit == EffortUnit::Nm || facts.torque_constants_nm_per_a.is_some();
+        let model = self.model.as_ref().filter(|_| is_told);
+        model.map_or_else(Vec::new, of_drives)
     }
 
     /// The link the tool is attached to.

@@ -10,6 +10,7 @@ pub mod chart;
 mod effects;
 mod findings;
 mod groups;
+pub mod models;
 mod number_format;
 mod proof;
 mod rivals;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use tauscope_archive::file_kind;
 use tauscope_dynamics::{
-    BodyFinding, BodySeverity, Model, ModelError, check_bodies, with_plausible_bodies,
+    BodyFinding, BodySeverity, Drive, Model, ModelError, check_bodies, with_plausible_bodies,
 };
 
 pub use mjcf::MjcfError;
@@ -47,32 +47,18 @@ const MAX_BYTES: u64 = 16 << 20;
 /// # Errors
 /// If there is no such file, it is of another kind, or the robot cannot be used.
 pub fn read(path: &Path) -> Result<Robot, UrdfError> {
-    let large = std::fs::metadata(path).map_or(0, |file| file.len());
-    if large > MAX_BYTES {
-        let path = path.display();
-        let title = format!("{path} has {large} bytes, the limit is {MAX_BYTES}");
-        return Err(UrdfError::Unreadable(title));
-    }
-    let text = std::fs::read_to_string(path).map_err(|error| {
-        let kind = file_kind(path);
-        UrdfError::Unreadable(match (error.kind(), kind) {
-            (std::io::ErrorKind::NotFound, _) => format!("there is no file {}", path.display()),
-            (_, Some(kind)) => format!("{} is {kind}", path.display()),
-            (_, None) => format!("{}: {error}", path.display()),
-        })
-    })?;
+    let text = text_of(path)?;
     // Faults of links and joints are reported before those of bodies.
-    let (text, model, remarks) = match Model::from_urdf(&text) {
-        Err(ModelError::NotARobot { found, .. }) if found == MJCF_ROOT => {
-            let (urdf, remarks) = mjcf::to_urdf(&text, path)?;
-            let model = Model::from_urdf(&urdf)?;
-            (urdf, model, remarks)
-        }
-        model => (text, model?, Vec::new()),
+    let (text, remarks) = if is_mjcf(&text) {
+        mjcf::to_urdf(&text, path)?
+    } else {
+        (text, Vec::new())
     };
+    let model = Model::from_urdf(&text)?;
+    let remarks = remarks.into_iter().chain(of_drives(&text, &model));
     let findings = check_bodies(&text)?;
     let sentences = findings.iter().map(ToString::to_string);
-    let sentences = remarks.into_iter().chain(sentences);
+    let sentences = remarks.chain(sentences);
     let sentences = sentences.map(|sentence| format!("{}: {sentence}", path.display()));
     let is_impossible = |finding: &BodyFinding| finding.severity == BodySeverity::Impossible;
     let (urdf, model) = if findings.iter().any(is_impossible) {
@@ -87,4 +73,82 @@ pub fn read(path: &Path) -> Result<Robot, UrdfError> {
         model,
         findings: sentences.collect(),
     })
+}
+
+fn text_of(path: &Path) -> Result<String, UrdfError> {
+    let large = std::fs::metadata(path).map_or(0, |file| file.len());
+    if large > MAX_BYTES {
+        let path = path.display();
+        let title = format!("{path} has {large} bytes, the limit is {MAX_BYTES}");
+        return Err(UrdfError::Unreadable(title));
+    }
+    std::fs::read_to_string(path).map_err(|error| {
+        let kind = file_kind(path);
+        UrdfError::Unreadable(match (error.kind(), kind) {
+            (std::io::ErrorKind::NotFound, _) => format!("there is no file {}", path.display()),
+            (_, Some(kind)) => format!("{} is {kind}", path.display()),
+            (_, None) => format!("{}: {error}", path.display()),
+        })
+    })
+}
+
+/// A robot file as it is written, for corrections at its places.
+#[derive(Debug, Clone)]
+pub enum Source {
+    /// A URDF.
+    Urdf(String),
+    /// A MuJoCo model, with the files that it includes in place of their `<include>`s.
+    Mjcf(String),
+}
+
+/// The robot file at `path` as it is written.
+///
+/// # Errors
+/// If it cannot be read, or a file that it includes.
+pub fn source(path: &Path) -> Result<Source, UrdfError> {
+    let text = text_of(path)?;
+    if is_mjcf(&text) {
+        Ok(Source::Mjcf(mjcf::whole(&text, path)?))
+    } else {
+        Ok(Source::Urdf(text))
+    }
+}
+
+fn is_mjcf(text: &str) -> bool {
+    let found = Model::from_urdf(text).err();
+    matches!(found, Some(ModelError::NotARobot { found, .. }) if found == MJCF_ROOT)
+}
+
+/// What is to be said of the drives that the file states.
+fn of_drives(urdf: &str, model: &Model) -> Vec<String> {
+    let mut said = Vec::new();
+    let joints = model.joints().iter();
+    let stated = joints
+        .filter(|joint| joint.drive != Drive::default())
+        .count();
+    if stated > 0 {
+        said.push(format!(
+            "it states friction, rotors or springs of {stated} joints. They are part of the twin, and findings are what is missing beside them"
+        ));
+    }
+    let size = |node: &roxmltree::Node<'_, '_>| {
+        let number = |name| {
+            node.attribute(name)
+                .and_then(|text| text.parse::<f64>().ok())
+        };
+        let all = ["damping", "friction"].into_iter().filter_map(number);
+        all.fold(0.0_f64, |most, x| most.max(x.abs()))
+    };
+    // The text has been read as a robot.
+    let document = roxmltree::Document::parse(urdf);
+    let dynamics = document.iter().flat_map(roxmltree::Document::descendants);
+    let dynamics = dynamics.filter(|node| node.has_tag_name("dynamics") && size(node) > 0.0);
+    let count = dynamics.count();
+    if count > 0 {
+        said.push(format!(
+            "the <dynamics> of {count} joints is no part of the twin, because exporters write placeholders there. Friction in findings is \
+             the whole friction"
+        ));
+    }
+    said
 }

@@ -8,10 +8,12 @@ use tauscope_archive::whole_file;
 use tauscope_explain::Outcome;
 use tauscope_explain::report::{MOTION_PREFIX, Verdict};
 use tauscope_report as html;
+use tauscope_report::models::{self, Corrections, Target};
+use tauscope_session::robot::{self, Source};
 
 use super::input::Request;
 use super::read::Kept;
-use super::{of_robot, picture, provenance_of, robot, twin, write_whole};
+use super::{of_robot, picture, provenance_of, twin, write_whole};
 use crate::existing::Force;
 use crate::exit::Failure;
 
@@ -20,6 +22,7 @@ const PICTURE: &str = "explain.rrd";
 const REPORT: &str = "report.json";
 const TWIN: &str = "twin.yaml";
 const ROBOT: &str = "robot.urdf";
+const ROBOT_MJCF: &str = "robot.xml";
 
 /// What was written.
 #[derive(Debug, Default)]
@@ -55,7 +58,7 @@ pub fn refuse_to_replace(out: &Path, request: &Request, force: Force) -> Result<
 /// What an explanation may write. Motions that are worth recording next have names that only it knows; those of an
 /// explanation before count.
 fn results<'a>(out: &'a Path, request: &'a Request) -> impl Iterator<Item = PathBuf> + 'a {
-    let fixed = [REPORT, PAGE, TWIN, ROBOT, PICTURE];
+    let fixed = [REPORT, PAGE, TWIN, ROBOT, ROBOT_MJCF, PICTURE];
     let recordings = request.fit.iter().chain(&request.holdout);
     let predictions = recordings.map(|recording| format!("{}.csv", recording.name));
     let names = fixed.into_iter().map(str::to_owned).chain(predictions);
@@ -95,7 +98,7 @@ pub fn write(
     outcome.report.notes.splice(0..0, of_robot(request));
     let provenance = provenance_of(request).context("what went in")?;
     // What an explanation before has left there must not stand beside a new report.
-    let fixed = [REPORT, PAGE, TWIN, ROBOT, PICTURE].map(|name| out.join(name));
+    let fixed = [REPORT, PAGE, TWIN, ROBOT, ROBOT_MJCF, PICTURE].map(|name| out.join(name));
     for path in fixed.into_iter().chain(motions(out)) {
         // One that is not there need not be removed; one that cannot be is found when it is written.
         let _ = std::fs::remove_file(path);
@@ -116,8 +119,8 @@ pub fn write(
     let is_handed_out = outcome.report.hands_out_twin();
     let twin = is_handed_out.then(|| twin_text(request, kept, outcome, &provenance, &mut made));
     let twin = twin.transpose()?;
-    let urdf = is_handed_out.then(|| robot_text(request, kept, outcome, &mut made));
-    let urdf = urdf.flatten();
+    let robot = is_handed_out.then(|| robot_text(request, kept, outcome, &mut made));
+    let robot = robot.flatten();
     let shown = |path: &Path| path.display().to_string();
     let (holdout, fit) = parted(request, &outcome.report.holdout_predictions);
     let around = html::Around {
@@ -129,7 +132,9 @@ pub fn write(
         fit,
         holdout,
         twin: twin.is_some().then(|| pasted(out, TWIN)),
-        corrected_robot: urdf.is_some().then(|| pasted(out, ROBOT)),
+        corrected_robot: (robot.as_ref())
+            .filter(|(name, _)| *name == ROBOT)
+            .map(|(name, _)| pasted(out, name)),
     };
     let put = |name: &str, text: &str, made: &mut Made| {
         let path = out.join(name);
@@ -146,8 +151,8 @@ pub fn write(
     if let Some(twin) = &twin {
         put(TWIN, twin, &mut made)?;
     }
-    if let Some(urdf) = &urdf {
-        put(ROBOT, urdf, &mut made)?;
+    if let Some((name, text)) = &robot {
+        put(name, text, &mut made)?;
     }
     if evaluated {
         let path = out.join(PICTURE);
@@ -216,26 +221,38 @@ fn twin_text(
     Ok(serde_saphyr::to_string(&file).context("the twin")?)
 }
 
-/// `None` where the URDF alone would not be the corrected twin.
+/// A corrected robot in the format of its file, and whether it is the whole corrected twin: a URDF where all of it is bodies, a
+/// MuJoCo model where any of it can be said there.
 fn robot_text(
     request: &Request,
     kept: &Kept,
     outcome: &Outcome,
     made: &mut Made,
-) -> Option<String> {
+) -> Option<(&'static str, String)> {
     let urdf = request.cell.facts.urdf.as_ref().filter(|_| kept.bodies)?;
     let mut gains = outcome.gain.iter();
     let mut offsets = kept.start.iter().flat_map(|start| &start.offset);
     let is_bare = gains.all(|gain| (gain - 1.0).abs() < f64::EPSILON)
         && offsets.all(|offset| offset.abs() < f64::EPSILON);
-    if !is_bare {
+    let corrections = Corrections::of(&kept.model, &outcome.terms);
+    if !is_bare || corrections.is_empty() {
         return None;
     }
-    match robot::corrected(urdf, &kept.model, &outcome.terms) {
-        Ok(text) => text,
-        Err(error) => {
+    let source = request.robot_path.as_ref().map(|path| robot::source(path));
+    let (name, target, text) = match source {
+        Some(Ok(Source::Mjcf(text))) => (ROBOT_MJCF, Target::Mjcf, text),
+        _ if corrections.is_only_bodies() => (ROBOT, Target::Urdf, urdf.clone()),
+        _ => return None,
+    };
+    match models::write(target, &text, urdf, &corrections) {
+        Ok(written) => {
+            let lost = written.lost.iter();
             made.notes
-                .push(format!("{ROBOT} was not written: {error}."));
+                .extend(lost.map(|lost| format!("Not in {name}, or only nearly: {lost}.")));
+            Some((name, written.text))
+        }
+        Err(error) => {
+            made.notes.push(format!("{name} was not written: {error}."));
             None
         }
     }

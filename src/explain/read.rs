@@ -106,11 +106,28 @@ pub fn read(request: &Request, progress: &dyn Fn(f64, &str)) -> Result<Input, Re
     })
 }
 
+/// What the robot's file states beside its bodies.
+fn of_robot(request: &Request) -> Option<Start> {
+    let terms = request.cell.stated_terms();
+    let joints = request.cell.facts.joint_names.len();
+    (!terms.is_empty() && request.twin_topic.is_none()).then(|| Start {
+        was_found: false,
+        terms,
+        gain: vec![1.0; joints],
+        gain_deviation: vec![0.0; joints],
+        offset: vec![0.0; joints],
+    })
+}
+
 fn start(request: &Request, report: &mut Report) -> Option<Start> {
     let facts = &request.cell.facts;
-    let file = &request.start.as_ref()?.file;
+    let Some(start) = &request.start else {
+        return of_robot(request);
+    };
+    let file = &start.file;
     match file.resolve(&facts.joint_names, facts.effort_unit.as_str()) {
         Ok(correction) => Some(Start {
+            was_found: true,
             terms: correction.terms,
             gain: correction.joints.iter().map(|joint| joint.gain).collect(),
             gain_deviation: correction.joints.iter().map(gain_deviation).collect(),

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Body, Frame, GRAVITY_M_S2, Joint, JointKind, Limits, Link, Load, Model};
+use super::{Body, Drive, Frame, GRAVITY_M_S2, Joint, JointKind, Limits, Link, Load, Model};
 use crate::inertia::Inertia;
 
 /// Share of a rigid body's mass below which a link is a dummy.
@@ -108,6 +108,7 @@ impl Model {
                 child_link: j + 1,
                 axis: [0.0, 0.0, 1.0],
                 limits: Limits::default(),
+                drive: Drive::default(),
             });
             // Behind link j, moved by joint j.
             model.links.push(link(format!("{name}_link"), Some(j)));

@@ -195,6 +195,7 @@ fn movable_joints(robot: &Robot, movers: &[Mover]) -> Vec<Joint> {
             child_link: raw.child,
             axis: movable.axis.into(),
             limits: movable.limits,
+            drive: movable.drive,
         })
     };
     robot.joints.iter().zip(movers).filter_map(joint).collect()

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Vector3};
 
 use super::document::{self, JointMarks};
-use super::{Geometry, JointKind, Limits, ModelError, Shape};
+use super::{Drive, Geometry, JointKind, Limits, ModelError, Shape};
 use crate::inertia::Inertia;
 use crate::inertia::symmetric;
 
@@ -45,6 +45,7 @@ pub(super) struct Movable {
     /// Of length 1.
     pub axis: Vector3<f64>,
     pub limits: Limits,
+    pub drive: Drive,
     pub follows: Option<Follows>,
 }
 
@@ -233,6 +234,7 @@ fn read_joint(
                 kind,
                 axis,
                 limits: limits(kind, &joint.limit, marks),
+                drive: marks.drive,
                 follows: joint.mimic.map(|mimic| Follows {
                     joint: mimic.joint,
                     ratio: mimic.multiplier.unwrap_or(1.0),

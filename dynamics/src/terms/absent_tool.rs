@@ -37,6 +37,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: |p| inertia(&array(p)).parameters().to_vec(),
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::As(|_| vec![super::Quantity::Body]),
     simulated: Simulated::Model,
     // What can be taken off depends on the URDF.
     concealed: None,

@@ -35,6 +35,10 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["coulomb_positive_nm", "coulomb_negative_nm"],
     }),
     excitation: Excitation::Speeds,
+    exported: super::Exported::Nearest(
+        |p| vec![super::Quantity::DryFriction(0.5 * (p[0] + p[1]))],
+        "simulators have one dry friction for both directions: the mean is written",
+    ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let (mut forward, mut back) = (1.0, 0.3 + 0.4 * draw.share);

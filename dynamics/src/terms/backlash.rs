@@ -53,6 +53,9 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["rotor_inertia_kgm2"],
     }),
     excitation: Excitation::Fast,
+    exported: super::Exported::No(
+        "a gear with play is two joints in series, the rotor in between: the tree of bodies has to be changed by hand",
+    ),
     simulated: Simulated::Transmission(|x, inertia| Compliance {
         stiffness: inertia * CONTACT_FREQUENCY * CONTACT_FREQUENCY,
         damping: 2.0 * CONTACT_DAMPING * CONTACT_FREQUENCY * inertia,

@@ -36,6 +36,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::As(|_| vec![super::Quantity::Gravity]),
     simulated: Simulated::Model,
     concealed: Some(|draw| {
         let (sin, cos) = draw.chance.between(0.0, TAU).sin_cos();

@@ -39,6 +39,7 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["bias_after_nm", "bias_before_nm"],
     }),
     excitation: Excitation::WholeRange,
+    exported: super::Exported::No(super::export::OF_RECORDING),
     simulated: Simulated::Record,
     concealed: None,
     traits: Traits {

@@ -39,6 +39,12 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: |p| vec![p[0], -p[0] * p[1]],
     simpler: None,
     excitation: Excitation::WholeRange,
+    exported: super::Exported::As(|p| {
+        vec![super::Quantity::Spring {
+            stiffness: p[0],
+            rest: p[1],
+        }]
+    }),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let (reach, middle) = (draw.half_range_rad, draw.middle_rad);

@@ -78,6 +78,7 @@ pub(super) static EFFECT: Effect = Effect {
     },
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::No(super::export::PASSES),
     simulated: Simulated::Load,
     concealed: Some(|draw| {
         let offset = drawn_offset(draw)?;

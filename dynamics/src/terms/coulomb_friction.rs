@@ -29,6 +29,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Speeds,
+    exported: super::Exported::As(|p| vec![super::Quantity::DryFriction(p[0])]),
     simulated: Simulated::Joint,
     concealed: Some(|draw| Drawn::new(draw.efforts_nm(), |f| vec![("coulomb_nm", f)])),
     traits: Traits {

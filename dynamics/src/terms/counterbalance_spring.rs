@@ -34,6 +34,9 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: |p| vec![p[0] * p[1].cos(), -p[0] * p[1].sin()],
     simpler: None,
     excitation: Excitation::WholeRange,
+    exported: super::Exported::No(
+        "no attribute has a spring by the sine of the angle; model it as a body on a lever, or as a spring between two bodies",
+    ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let rest = draw.chance.between(-PI, PI);

@@ -42,6 +42,9 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::No(
+        "no simulator has a drive that answers small commands with nothing",
+    ),
     simulated: Simulated::Record,
     concealed: Some(|draw| {
         let largest = draw.largest_nm.max(1e-3);

@@ -1,6 +1,7 @@
 //! What there is to know of a term without its numbers.
 
 use super::concealed::{Draw, Drawn};
+use super::export::Exported;
 use super::words::Words;
 use super::{Site, Term, UNKNOWN};
 
@@ -40,6 +41,8 @@ pub struct Effect {
     pub simpler: Option<Simpler>,
     /// The motion that shows it.
     pub excitation: Excitation,
+    /// How a simulator's model says it.
+    pub exported: Exported,
     /// How a simulated arm suffers it.
     pub simulated: Simulated,
     /// Draws one at random, to be concealed; `None` for what only describes. Its `sizes` change some effort the more the larger.
@@ -85,6 +88,11 @@ impl Effect {
     /// Whether it is Coulomb or viscous friction.
     pub fn is_plain_friction(&self) -> bool {
         self.family == Family::PlainFriction
+    }
+
+    /// Whether a twin may hold more of it than there is, so that a correction takes some of it away.
+    pub fn may_be_overstated(&self) -> bool {
+        self.is_plain_friction() || self.traits.may_be_overstated
     }
 
     /// Whether it splits its joint in rotor and link.
@@ -240,6 +248,8 @@ pub struct Traits {
     pub fills_recording: bool,
     /// It acts from the start of the session to some time, or from some time to its end, in several recordings perhaps.
     pub in_session: bool,
+    /// Robot files and twins hold it, and perhaps too much of it.
+    pub may_be_overstated: bool,
     /// It is estimated every night, whether it is there or not, and followed over weeks.
     pub is_followed: bool,
     /// What the smallest size that would have been found is told as: its first factor. `None` if that does not make it.
@@ -263,6 +273,7 @@ impl Traits {
         bends: false,
         fills_recording: false,
         in_session: false,
+        may_be_overstated: false,
         is_followed: false,
         smallest_told_as: None,
     };

@@ -42,6 +42,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: wave::to_coordinates,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::No(super::export::OF_RECORDING),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let cycles = f64::from(draw.chance.whole(1, 2));

@@ -54,6 +54,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::No(super::export::PASSES),
     simulated: Simulated::Load,
     concealed: Some(|draw| {
         let shortest_s = draw.shortest_s;

@@ -40,6 +40,7 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["coulomb_start_nm"],
     }),
     excitation: Excitation::Speeds,
+    exported: super::Exported::No(super::export::CHANGES),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let end_s = draw.start_session_s + draw.shortest_s;

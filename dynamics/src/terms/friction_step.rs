@@ -40,6 +40,7 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["coulomb_after_nm", "coulomb_before_nm"],
     }),
     excitation: Excitation::Speeds,
+    exported: super::Exported::No(super::export::CHANGES),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let before = 0.2 + 0.3 * draw.share;

@@ -39,6 +39,7 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["gain_excess_start"],
     }),
     excitation: Excitation::Poses,
+    exported: super::Exported::No(super::export::OF_RECORDING),
     simulated: Simulated::Record,
     concealed: Some(|draw| {
         let (sign, end_s) = (draw.sign, draw.start_session_s + draw.shortest_s);

@@ -41,6 +41,7 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["gain_excess_after", "gain_excess_before"],
     }),
     excitation: Excitation::Poses,
+    exported: super::Exported::No(super::export::OF_RECORDING),
     simulated: Simulated::Record,
     concealed: None,
     traits: Traits {

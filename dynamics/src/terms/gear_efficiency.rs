@@ -39,6 +39,7 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["driving_coefficient", "backdriving_coefficient"],
     }),
     excitation: Excitation::Speeds,
+    exported: super::Exported::No("no simulator has friction that grows with the load"),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let (mut drives, mut driven) = (1.0, 0.2 + 0.3 * draw.share);

@@ -43,6 +43,9 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["rotor_inertia_kgm2"],
     }),
     excitation: Excitation::Fast,
+    exported: super::Exported::No(
+        "an elastic joint is two joints in series, the rotor in between: the tree of bodies has to be changed by hand",
+    ),
     simulated: Simulated::Transmission(|x, inertia| Compliance {
         stiffness: x[1],
         damping: 2.0 * DAMPING_RATIO * (x[1] * inertia).sqrt(),

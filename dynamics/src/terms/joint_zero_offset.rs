@@ -33,6 +33,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::As(|p| vec![super::Quantity::Zero(p[0])]),
     simulated: Simulated::Model,
     concealed: Some(|draw| {
         let sign = if draw.chance.coin() { 1.0 } else { -1.0 };

@@ -38,6 +38,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::No(super::export::PASSES),
     simulated: Simulated::No(
         "simulate that recording by a scenario of its own that has a `joint_zero_offset`",
     ),

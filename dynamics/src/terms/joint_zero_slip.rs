@@ -42,6 +42,7 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["offset_after_rad", "offset_before_rad"],
     }),
     excitation: Excitation::Poses,
+    exported: super::Exported::No(super::export::PASSES),
     simulated: Simulated::No(
         "simulate the recordings from then on by a scenario of their own that has a `joint_zero_offset`",
     ),

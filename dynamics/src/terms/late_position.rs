@@ -36,6 +36,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Fast,
+    exported: super::Exported::No(super::export::OF_RECORDING),
     simulated: Simulated::No(
         "shift the position of that joint in a simulated recording, for example in its CSV table",
     ),

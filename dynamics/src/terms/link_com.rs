@@ -40,6 +40,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::As(|_| vec![super::Quantity::Body]),
     simulated: Simulated::Model,
     concealed: Some(|draw| {
         let names = ["delta_com_x_m", "delta_com_y_m", "delta_com_z_m"];

@@ -55,6 +55,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::As(|_| vec![super::Quantity::Body]),
     simulated: Simulated::Model,
     concealed: None,
     traits: Traits {

@@ -35,6 +35,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::As(|_| vec![super::Quantity::Body]),
     simulated: Simulated::Model,
     concealed: Some(|draw| {
         let most = MOST_DRAWN * draw.site.model.links()[draw.site.link].mass_kg();

@@ -26,6 +26,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Speeds,
+    exported: super::Exported::No("no simulator has friction that grows with the load"),
     simulated: Simulated::Joint,
     concealed: Some(|_| Drawn::new([1e-4, 0.5], |c| vec![("coefficient", c)])),
     traits: Traits {

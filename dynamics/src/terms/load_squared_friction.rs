@@ -28,6 +28,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Speeds,
+    exported: super::Exported::No("no simulator has friction that grows with the load"),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let largest = draw.largest_nm.max(1e-3);

@@ -30,6 +30,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: |p| inertia(&array(p)).parameters().to_vec(),
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::As(|_| vec![super::Quantity::Body]),
     simulated: Simulated::Model,
     concealed: Some(|draw| drawn(draw, None)),
     traits: Traits {

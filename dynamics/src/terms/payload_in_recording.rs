@@ -38,6 +38,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: coordinates_with_times,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::No(super::export::PASSES),
     simulated: Simulated::No(
         "simulate the recordings with it by a scenario of their own that has a `payload`",
     ),

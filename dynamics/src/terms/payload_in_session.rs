@@ -38,6 +38,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: coordinates_with_times,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::No(super::export::PASSES),
     simulated: Simulated::No(
         "simulate the recordings before and after it by scenarios of their own, one of which has a `payload`",
     ),

@@ -37,6 +37,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: coordinates_with_times,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::No(super::export::PASSES),
     simulated: Simulated::CarriedForAWhile,
     concealed: Some(|draw| drawn(draw, Some([[0.2, 0.4], [0.6, 0.85]]))),
     traits: Traits::NONE,

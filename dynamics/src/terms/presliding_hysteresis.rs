@@ -41,6 +41,10 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["coulomb_nm"],
     }),
     excitation: Excitation::Speeds,
+    exported: super::Exported::Nearest(
+        |p| vec![super::Quantity::DryFriction(p[0])],
+        "the dry friction is written; simulators have springs of their own before a joint slips",
+    ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let (yields_rad, damping_s) = (draw.chance.between(0.01, 0.03), 0.01);

@@ -26,6 +26,9 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Speeds,
+    exported: super::Exported::No(
+        "no simulator has friction that grows with the square of the speed; fit viscous friction instead: --without quadratic_drag",
+    ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let fastest = draw.fastest_rad_s;

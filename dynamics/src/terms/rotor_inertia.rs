@@ -27,12 +27,14 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Fast,
+    exported: super::Exported::As(|p| vec![super::Quantity::Armature(p[0])]),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let most = draw.largest_acceleration_rad_s2;
         Drawn::new(draw.efforts_nm(), move |f| vec![("inertia_kgm2", f / most)])
     }),
     traits: Traits {
+        may_be_overstated: true,
         smallest_told_as: Some("inertia_kgm2"),
         ..Traits::NONE
     },

@@ -42,6 +42,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::No(super::export::OF_RECORDING),
     simulated: Simulated::Record,
     concealed: Some(|draw| {
         let turning = draw.largest_nm.max(1e-3) * draw.chance.between(0.05, 0.2);

@@ -36,6 +36,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Fast,
+    exported: super::Exported::No(super::export::OF_RECORDING),
     simulated: Simulated::Record,
     concealed: Some(|_| Drawn::new([0.1, 10.0], |late| vec![("delay_per_hour_s", late)])),
     traits: Traits {

@@ -50,6 +50,15 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["coulomb_nm", "static_nm"],
     }),
     excitation: Excitation::Speeds,
+    exported: super::Exported::Nearest(
+        |p| {
+            vec![
+                super::Quantity::DryFriction(p[0]),
+                super::Quantity::StaticFriction(p[1]),
+            ]
+        },
+        "friction in motion is written, and friction at rest where the simulator knows it; no simulator has the fall in between",
+    ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let more = 1.5 + draw.share;

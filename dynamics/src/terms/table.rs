@@ -31,6 +31,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Speeds,
+    exported: super::Exported::No("it is a curve without a law; no simulator has one"),
     simulated: Simulated::Joint,
     concealed: None,
     traits: Traits {

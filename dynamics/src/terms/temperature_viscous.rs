@@ -45,6 +45,10 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["viscous_warm_nms_per_rad"],
     }),
     excitation: Excitation::Speeds,
+    exported: super::Exported::Nearest(
+        |p| vec![super::Quantity::Damping(p[0])],
+        "the friction of the warm joint is written",
+    ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let warm = 0.3 + 0.5 * draw.share;

@@ -32,6 +32,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: |p| vec![p[0] - 1.0],
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::No(super::export::OF_RECORDING),
     simulated: Simulated::Record,
     concealed: Some(|draw| {
         let sign = draw.sign;

@@ -29,6 +29,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Fast,
+    exported: super::Exported::No(super::export::OF_RECORDING),
     simulated: Simulated::Record,
     concealed: Some(|_| {
         Drawn::new([1e-3, 0.3], |time_s| {

@@ -42,6 +42,9 @@ pub(super) static EFFECT: Effect = Effect {
     },
     simpler: None,
     excitation: Excitation::WholeRange,
+    exported: super::Exported::No(
+        "no simulator has a torque that ripples with the angle; it hardly moves an arm",
+    ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let cycles = f64::from(draw.chance.whole(4, 24));

@@ -26,6 +26,9 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Poses,
+    exported: super::Exported::No(
+        "no attribute has a coupling of efforts between joints; MuJoCo has fixed tendons",
+    ),
     simulated: Simulated::Record,
     concealed: Some(|draw| {
         let sign = draw.sign;

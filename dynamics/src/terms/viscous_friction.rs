@@ -29,6 +29,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Speeds,
+    exported: super::Exported::As(|p| vec![super::Quantity::Damping(p[0])]),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let fastest = draw.fastest_rad_s;

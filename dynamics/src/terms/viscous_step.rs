@@ -39,6 +39,7 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["viscous_after_nms_per_rad", "viscous_before_nms_per_rad"],
     }),
     excitation: Excitation::Speeds,
+    exported: super::Exported::No(super::export::CHANGES),
     simulated: Simulated::Joint,
     concealed: None,
     traits: Traits {

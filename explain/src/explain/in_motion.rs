@@ -86,7 +86,7 @@ impl Context<'_> {
             _ => {}
         }
         // A corrected twin was made of this robot, and in its unit.
-        if input.start.is_some() {
+        if input.found_before().is_some() {
             return Ok(None);
         }
         if let Some(mut reason) = likeness.of_another_robot() {

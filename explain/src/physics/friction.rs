@@ -1,4 +1,4 @@
-//! Friction that differs from the twin's: reported as a difference, stored as a sum.
+//! Friction and rotors that differ from the twin's: reported as a difference, stored as a sum.
 
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Effect, Layer, PlaceKind, TermSpec};
@@ -7,17 +7,17 @@ use crate::data::problem::Problem;
 use crate::physics::active::Hypothesis;
 use crate::physics::parameter_units::power_of_effort;
 
-/// The plain friction that an effect is or contains, and the effect's parameters that are proportional to it.
+/// The plain friction or the rotor that an effect is or contains, and the effect's parameters that are proportional to it.
 fn contained(effect: &'static Effect) -> Option<(&'static Effect, Vec<&'static str>)> {
-    if effect.is_plain_friction() {
+    if effect.may_be_overstated() {
         return Some((effect, effect.parameters.iter().map(|p| p.name).collect()));
     }
     let simpler = effect.simpler?;
-    let plain = simpler.effect.is_plain_friction();
+    let plain = simpler.effect.may_be_overstated();
     plain.then(|| (simpler.effect, simpler.numbers.to_vec()))
 }
 
-/// The plain friction that a term contains: its name and its value.
+/// The plain friction or the rotor that a term contains: its name and its value.
 pub fn of(term: &TermSpec) -> Option<(&'static str, f64)> {
     let (plain, numbers) = contained(term.effect().ok()?)?;
     let values = numbers
@@ -26,11 +26,11 @@ pub fn of(term: &TermSpec) -> Option<(&'static str, f64)> {
     Some((plain.name, values.reduce(f64::min)?))
 }
 
-/// Adds a new term to those of a twin. Plain friction is added to the term of the same joint that contains it already, if
+/// Adds a new term to those of a twin. Plain friction or a rotor is added to the term of the same joint that contains it already, if
 /// there is one.
 pub fn add(term: TermSpec, to: &mut Vec<TermSpec>) {
     if let Ok(plain) = term.effect()
-        && plain.is_plain_friction()
+        && plain.may_be_overstated()
         && let Some(more) = plain
             .parameters
             .first()

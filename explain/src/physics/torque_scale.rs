@@ -35,6 +35,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: |p| vec![p[0] - 1.0],
     simpler: None,
     excitation: Excitation::Poses,
+    exported: tauscope_dynamics::terms::Exported::No("it is the unit of the recording"),
     simulated: Simulated::Record,
     concealed: None,
     traits: Traits::NONE,

@@ -38,7 +38,10 @@ pub fn before(input: &Input) -> Option<String> {
             recording.duration_s()
         ));
     }
-    if input.fit.len() + input.holdout.len() < 2 && input.start.is_none() && !at_rest(input) {
+    if input.fit.len() + input.holdout.len() < 2
+        && input.found_before().is_none()
+        && !at_rest(input)
+    {
         return Some(
             "there is only one recording, and a fit must be tested on another one. Record the same arm once more, \
              with another motion, or start from a corrected twin"

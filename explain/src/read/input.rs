@@ -34,6 +34,11 @@ pub struct Input {
 const FOR_ONE_HELD_OUT: usize = 4;
 
 impl Input {
+    /// The corrected twin that was found on this arm before, if it is the start.
+    pub fn found_before(&self) -> Option<&Start> {
+        self.start.as_ref().filter(|start| start.was_found)
+    }
+
     /// Holds out some of the recordings to fit: a quarter, of middle travel.
     pub fn hold_out_some(&mut self) {
         let joints = self.model.dof();

@@ -1,4 +1,4 @@
-//! The corrected twin that an explanation starts from.
+//! What an explanation starts from beside the rigid bodies: a corrected twin, or what the robot's file states.
 
 use tauscope_dynamics::terms::{Against, TermSpec};
 
@@ -6,9 +6,11 @@ use tauscope_dynamics::terms::{Against, TermSpec};
 /// Statistical: its 95 % interval is then no wider than ±1.96 / 5 = ±39 %.
 pub const KNOWN: f64 = 5.0;
 
-/// A corrected twin.
+/// A twin's physics beside the rigid bodies.
 #[derive(Debug, Clone, Default)]
 pub struct Start {
+    /// Whether it was found on this arm before. Else the robot's file states it.
+    pub was_found: bool,
     /// Its physics terms.
     pub terms: Vec<TermSpec>,
     /// Gain of each joint's bodies \[effort unit per model unit\].

@@ -18,6 +18,7 @@ use mjcf_rs::equality::Equality;
 use mjcf_rs::extras::ActuatorKind;
 use mjcf_rs::{BodyId, Model, ParseError};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use tauscope_dynamics::MUJOCO;
 
 use bodies::{NoInertia, inertia, shapes};
 use includes::with_includes;
@@ -80,9 +81,8 @@ const SAVE: &str = "python3 -c \"import mujoco; m = mujoco.MjModel.from_xml_path
 /// # Errors
 /// If it is no MuJoCo model of a robot with a fixed base, or a mass is not in the file.
 pub fn to_urdf(xml: &str, path: &Path) -> Result<(String, Vec<String>), MjcfError> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let whole = with_includes(xml, folder, &[path.to_path_buf()])?;
-    let model = Model::from_str(&whole, folder)?;
+    let folder = folder_of(path);
+    let model = Model::from_str(&whole(xml, path)?, folder)?;
     let compiler = &model.compiler;
     for (changes, name) in [
         (compiler.balance_inertia, "balanceinertia"),
@@ -104,6 +104,18 @@ pub fn to_urdf(xml: &str, path: &Path) -> Result<(String, Vec<String>), MjcfErro
     };
     writer.robot()?;
     Ok((writer.text, writer.remarks))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().unwrap_or(Path::new("."))
+}
+
+/// The model in `xml`, whose file is at `path`, with the files that it includes.
+///
+/// # Errors
+/// If one of them cannot be read.
+pub fn whole(xml: &str, path: &Path) -> Result<String, MjcfError> {
+    with_includes(xml, folder_of(path), &[path.to_path_buf()])
 }
 
 /// Names of all bodies and joints, which MuJoCo allows to be missing.
@@ -150,7 +162,7 @@ impl Writer<'_> {
         let name = escaped(name);
         let _ = writeln!(
             self.text,
-            "<?xml version=\"1.0\"?>\n<robot name=\"{name}\" xmlns:drake=\"http://drake.mit.edu\">"
+            "<?xml version=\"1.0\"?>\n<robot name=\"{name}\" xmlns:mujoco=\"{MUJOCO}\">"
         );
         self.base();
         let mut floating = Vec::new();
@@ -258,7 +270,15 @@ impl Writer<'_> {
             inertia(self.model, body, &name)?,
             shapes(self.model, self.folder, body, &at),
         );
-        let _ = writeln!(self.text, "  <link name=\"{}\">", escaped(&name));
+        let from = at.translation;
+        let _ = writeln!(
+            self.text,
+            "  <link name=\"{}\">\n    <mujoco:body pos=\"{} {} {}\"/>",
+            escaped(&name),
+            from.x,
+            from.y,
+            from.z
+        );
         if let Some(mass) = mass {
             let [xx, xy, xz, yy, yz, zz] = mass.inertia_about_com_kgm2();
             let com = at * nalgebra::Point3::from(mass.com_m());
@@ -283,7 +303,7 @@ impl Writer<'_> {
     }
 
     /// The URDF type of a joint, and its elements beside origin, parent and child.
-    fn moving(&mut self, joint: &Joint, name: &str, axis: Vector3<f64>) -> (&'static str, String) {
+    fn moving(&self, joint: &Joint, name: &str, axis: Vector3<f64>) -> (&'static str, String) {
         let mut rest = format!("    <axis xyz=\"{} {} {}\"/>\n", axis.x, axis.y, axis.z);
         let autolimits = self.model.compiler.autolimits;
         let is_limited = joint.limited.resolve(autolimits, joint.range.is_some());
@@ -298,29 +318,11 @@ impl Writer<'_> {
             let _ = write!(limit, " lower=\"{lower}\" upper=\"{upper}\"");
         }
         let _ = writeln!(rest, "    <limit {limit}/>");
-        if joint.damping > 0.0 || joint.frictionloss > 0.0 {
-            let _ = writeln!(
-                rest,
-                "    <dynamics damping=\"{}\" friction=\"{}\"/>",
-                joint.damping, joint.frictionloss
-            );
-        }
-        if joint.stiffness > 0.0 {
-            let _ = writeln!(
-                rest,
-                "    <spring stiffness=\"{}\" reference=\"{}\"/>",
-                joint.stiffness, joint.springref
-            );
-        }
-        if joint.armature > 0.0 {
-            let own = escaped(name);
-            let _ = writeln!(
-                self.text,
-                "  <transmission name=\"{own}_drive\">\n    <joint name=\"{own}\"/>\n    <actuator name=\"{own}_motor\">\n      \
-                 <drake:rotor_inertia value=\"{}\"/>\n    </actuator>\n  </transmission>",
-                joint.armature
-            );
-        }
+        let _ = writeln!(
+            rest,
+            "    <mujoco:joint damping=\"{}\" frictionloss=\"{}\" armature=\"{}\" stiffness=\"{}\" springref=\"{}\"/>",
+            joint.damping, joint.frictionloss, joint.armature, joint.stiffness, joint.springref
+        );
         let kind = match (joint.type_, range) {
             (JointType::Slide, _) => "prismatic",
             (_, Some(_)) => "revolute",

@@ -1,0 +1,70 @@
+//! What a robot file says of joints' drives, beside the bodies.
+
+use std::collections::BTreeMap;
+
+use roxmltree::{Document, Node};
+
+use super::document::elements;
+
+/// Namespace of the attributes that a MuJoCo model's joint has and a URDF's has not.
+pub const MUJOCO: &str = "http://www.mujoco.org";
+/// Namespace of Drake's elements.
+const DRAKE: &str = "http://drake.mit.edu";
+
+/// What a robot file says of a joint's drive; zero where it says nothing. A URDF's `<dynamics>` is no part of it: exporters
+/// write placeholders there.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Drive {
+    /// Viscous friction \[N m s/rad or N s/m\].
+    pub damping: f64,
+    /// Coulomb friction \[N m or N\].
+    pub friction: f64,
+    /// Inertia of the rotor, seen at the joint \[kg m² or kg\].
+    pub rotor_inertia: f64,
+    /// Stiffness of a spring \[N m/rad or N/m\].
+    pub stiffness: f64,
+    /// Where the spring is at rest \[rad or m\].
+    pub rest: f64,
+}
+
+/// The drives of a document by the joint's name: elements `joint` of the namespace [`MUJOCO`] in the joints, and Drake's
+/// `rotor_inertia` and `gear_ratio` in the actuators of transmissions.
+pub(super) fn drives(document: &Document<'_>) -> BTreeMap<String, Drive> {
+    let mut all: BTreeMap<String, Drive> = BTreeMap::new();
+    let root = document.root_element();
+    for part in elements(root) {
+        let is_joint = part.has_tag_name("joint");
+        let own = elements(part).find(|node| node.has_tag_name((MUJOCO, "joint")));
+        if let (true, Some(own), Some(name)) = (is_joint, own, part.attribute("name")) {
+            let drive = all.entry(name.to_owned()).or_default();
+            drive.damping = number(own.attribute("damping"));
+            drive.friction = number(own.attribute("frictionloss"));
+            drive.rotor_inertia = number(own.attribute("armature"));
+            drive.stiffness = number(own.attribute("stiffness"));
+            drive.rest = number(own.attribute("springref"));
+        }
+        let joint = elements(part).find(|node| node.has_tag_name("joint"));
+        let joint = joint.and_then(|joint| joint.attribute("name"));
+        let actuator = elements(part).find(|node| node.has_tag_name("actuator"));
+        if let (true, Some(joint), Some(actuator)) =
+            (part.has_tag_name("transmission"), joint, actuator)
+        {
+            let value = |name: &str| {
+                let own = elements(actuator).find(|node: &Node| node.has_tag_name((DRAKE, name)));
+                own.map(|own| number(own.attribute("value")))
+            };
+            let ratio = value("gear_ratio").unwrap_or(1.0);
+            let inertia = value("rotor_inertia").unwrap_or(0.0) * ratio * ratio;
+            if inertia > 0.0 {
+                all.entry(joint.to_owned()).or_default().rotor_inertia = inertia;
+            }
+        }
+    }
+    all
+}
+
+/// A number; zero where there is none.
+fn number(text: Option<&str>) -> f64 {
+    let number = text.and_then(|text| text.trim().parse::<f64>().ok());
+    number.filter(|x| x.is_finite()).unwrap_or(0.0)
+}

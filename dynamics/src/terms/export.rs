@@ -1,0 +1,72 @@
+//! What a simulator can hold of an effect.
+
+use super::{Effect, TermSpec};
+
+/// What a simulator's model has beside its bodies' geometry. Signs are those of the joint's axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Quantity {
+    /// Viscous friction \[N m s/rad or N s/m\].
+    Damping(f64),
+    /// Friction that does not depend on speed \[N m or N\].
+    DryFriction(f64),
+    /// Dry friction at rest, where that is larger than in motion \[N m or N\].
+    StaticFriction(f64),
+    /// Inertia of the rotor, seen at the joint \[kg m² or kg\].
+    Armature(f64),
+    /// A spring.
+    Spring {
+        /// \[N m/rad or N/m\]
+        stiffness: f64,
+        /// Where it is at rest \[rad or m\].
+        rest: f64,
+    },
+    /// What the joint's zero is off by \[rad or m\]: where it reads q, the joint is at q + this.
+    Zero(f64),
+    /// A body's mass, centre of mass and inertia ([`super::Term::inertia`]).
+    Body,
+    /// The direction of gravity in the base ([`super::Term::alter`]).
+    Gravity,
+}
+
+/// How a simulator's model says an effect.
+#[derive(Debug, Clone, Copy)]
+pub enum Exported {
+    /// By these quantities, from its parameters.
+    As(fn(&[f64]) -> Vec<Quantity>),
+    /// Nearest by these quantities; the sentence says what is lost.
+    Nearest(fn(&[f64]) -> Vec<Quantity>, &'static str),
+    /// Not at all, and why.
+    No(&'static str),
+}
+
+/// Reason of effects that are no part of an arm.
+pub const OF_RECORDING: &str = "it is in what is recorded, not in the arm: mend the recording";
+/// Reason of what comes and goes.
+pub const PASSES: &str = "it comes and goes: it belongs to a scenario, not to the model";
+/// Reason of what changes once or steadily.
+pub const CHANGES: &str = "it changes in time; twin.yaml has what is left of it now as a simpler effect, which is written";
+
+impl Effect {
+    /// The quantities of a term of this effect, and what they lose.
+    ///
+    /// # Errors
+    /// The reason why no simulator says it.
+    pub fn quantities(
+        &self,
+        spec: &TermSpec,
+    ) -> Result<(Vec<Quantity>, Option<&'static str>), &'static str> {
+        let value = |p: &super::Parameter| {
+            spec.parameters
+                .get(p.name)
+                .copied()
+                .or(p.default)
+                .unwrap_or(0.0)
+        };
+        let values: Vec<f64> = self.parameters.iter().map(value).collect();
+        match self.exported {
+            Exported::As(of) => Ok((of(&values), None)),
+            Exported::Nearest(of, lost) => Ok((of(&values), Some(lost))),
+            Exported::No(why) => Err(why),
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Corrections in a simulator's own file.
+//!
+//! A twin's terms become [`Corrections`]: quantities of joints and bodies. A [`Target`] says which of them its simulator has, by
+//! which element; writers change those places of the user's file and nothing else.
+
+mod corrections;
+mod edits;
+mod isaac_lab;
+mod mjcf;
+mod sdf;
+mod target;
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests;
+mod urdf;
+
+pub use corrections::{Corrections, JointCorrections};
+pub use target::{Place, TARGETS, Target};
+
+/// Why a model cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelError {
+    /// The file is no XML.
+    #[error("the model is not well-formed XML: {0}")]
+    Xml(#[from] roxmltree::Error),
+    /// The file is of another kind.
+    #[error(
+        "the model is a <{found}>, and {target} needs a <{expected}>: give the file with --model FILE"
+    )]
+    OtherKind {
+        /// The outermost element.
+        found: String,
+        /// What is to be written.
+        target: &'static str,
+        /// The outermost element that it needs.
+        expected: &'static str,
+    },
+    /// The file lacks a joint or a link.
+    #[error("the model has no {kind} `{name}`")]
+    Missing {
+        /// `joint`, `link` or `body`.
+        kind: &'static str,
+        /// Its name.
+        name: String,
+    },
+    /// A link would have a mass or inertia that no body has.
+    #[error(
+        "{kind} `{name}` would get a mass or an inertia that no rigid body has: this data tells some of its numbers too badly"
+    )]
+    NoBody {
+        /// `link` or `body`.
+        kind: &'static str,
+        /// Its name.
+        name: String,
+    },
+}
+
+/// A file for a simulator.
+#[derive(Debug)]
+pub struct Written {
+    /// Its text.
+    pub text: String,
+    /// What was written, a line each.
+    pub written: Vec<String>,
+    /// What was approximated or left out, and why, a line each.
+    pub lost: Vec<String>,
+}
+
+/// The corrections in the file `source` of a simulator (empty for one that needs none). `urdf` is the robot as the twin reads it.
+///
+/// # Errors
+/// If the file is not one of that simulator, or lacks what is to be corrected.
+pub fn write(
+    target: Target,
+    source: &str,
+    urdf: &str,
+    corrections: &Corrections,
+) -> Result<Written, ModelError> {
+    let text = match target {
+        Target::Urdf | Target::Drake => urdf::corrected(target, source, corrections)?,
+        Target::Mjcf => mjcf::corrected(source, urdf, corrections)?,
+        Target::Sdf => sdf::corrected(source, corrections)?,
+        Target::IsaacLab => isaac_lab::configuration(corrections),
+    };
+    let (written, mut lost) = target.said(corrections);
+    lost.extend(corrections.lost.iter().cloned());
+    Ok(Written {
+        text: target.with_comment(&text, &written, &lost),
+        written,
+        lost,
+    })
+}

@@ -1,0 +1,153 @@
+//! What the terms of a twin ask of a model.
+
+use std::collections::BTreeMap;
+
+use tauscope_dynamics::terms::{Quantity, TermSpec};
+use tauscope_dynamics::{Drive, Inertia, Model};
+
+/// Smallest change of a direction of gravity that counts \[m/s²\]. Resolution: of a file with seven digits.
+const LEAST_GRAVITY_M_S2: f64 = 1e-6;
+
+/// Numbers that differ by less, as a share, are the same. Resolution: of nine digits.
+const SAME: f64 = 1e-9;
+
+/// What is to be in the model of a joint; `None` where it stays as it is.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct JointCorrections {
+    /// Viscous friction \[N m s/rad or N s/m\].
+    pub damping: Option<f64>,
+    /// Dry friction \[N m or N\].
+    pub friction: Option<f64>,
+    /// Dry friction at rest, where that is larger \[N m or N\].
+    pub static_friction: Option<f64>,
+    /// Inertia of the rotor \[kg m² or kg\].
+    pub armature: Option<f64>,
+    /// Stiffness of a spring and where it is at rest \[N m/rad, rad; or N/m, m\].
+    pub spring: Option<[f64; 2]>,
+    /// What the zero is off by \[rad or m\].
+    pub zero: Option<f64>,
+}
+
+/// What is to be in a robot's model.
+#[derive(Debug, Clone, Default)]
+pub struct Corrections {
+    /// By joint.
+    pub joints: BTreeMap<String, JointCorrections>,
+    /// The whole inertia of links, in their frames.
+    pub bodies: BTreeMap<String, Inertia>,
+    /// Gravity in the base \[m/s²\].
+    pub gravity: Option<[f64; 3]>,
+    /// Inertia of links before, for the reader of a file.
+    pub before: BTreeMap<String, Inertia>,
+    /// Effects that no simulator says or says only nearly, and why.
+    pub lost: Vec<String>,
+}
+
+impl Corrections {
+    /// What these terms ask of the model of a robot. Terms of the same kind add up.
+    pub fn of(model: &Model, terms: &[TermSpec]) -> Self {
+        let mut all = Self::default();
+        let mut turned = model.clone();
+        for spec in terms {
+            let Ok(effect) = spec.effect() else { continue };
+            let place = spec.joint.as_ref().or(spec.link.as_ref());
+            let place = place.map_or_else(String::new, |place| format!(" at {place}"));
+            let quantities = match effect.quantities(spec) {
+                Ok((quantities, lost)) => {
+                    let lost = lost.map(|lost| format!("{}{place}: {lost}", effect.name));
+                    all.lost.extend(lost);
+                    quantities
+                }
+                Err(why) => {
+                    all.lost
+                        .push(format!("{}{place} is not written: {why}", effect.name));
+                    continue;
+                }
+            };
+            for quantity in quantities {
+                match quantity {
+                    Quantity::Body => all.add_body(model, spec),
+                    Quantity::Gravity => {
+                        if let Ok(term) = spec.build(model) {
+                            term.alter(&mut turned);
+                        }
+                    }
+                    own => {
+                        if let Some(joint) = &spec.joint {
+                            all.joints.entry(joint.clone()).or_default().add(own);
+                        }
+                    }
+                }
+            }
+        }
+        for joint in model.joints() {
+            if let Some(own) = all.joints.get_mut(&joint.name) {
+                own.drop_stated(joint.drive);
+            }
+        }
+        all.joints
+            .retain(|_, own| *own != JointCorrections::default());
+        let (before, after) = (model.gravity(), turned.gravity());
+        let change = before.iter().zip(after).map(|(a, b)| (a - b).abs());
+        let is_turned = change.fold(0.0, f64::max) > LEAST_GRAVITY_M_S2;
+        all.gravity = is_turned.then_some(after);
+        all
+    }
+
+    /// Whether they are bodies and nothing else, so that a corrected URDF is the whole corrected twin.
+    pub fn is_only_bodies(&self) -> bool {
+        let is_else = !self.joints.is_empty() || self.gravity.is_some() || !self.lost.is_empty();
+        !self.bodies.is_empty() && !is_else
+    }
+
+    /// Whether there is nothing to write.
+    pub fn is_empty(&self) -> bool {
+        self.joints.is_empty() && self.bodies.is_empty() && self.gravity.is_none()
+    }
+
+    fn add_body(&mut self, model: &Model, spec: &TermSpec) {
+        let Some((link, change)) = spec.build(model).ok().and_then(|term| term.inertia()) else {
+            return;
+        };
+        let link = &model.links()[link];
+        self.before.insert(link.name.clone(), link.inertia);
+        let own = self.bodies.entry(link.name.clone()).or_insert(link.inertia);
+        *own += change;
+    }
+}
+
+impl JointCorrections {
+    /// Drops what the robot's file states already.
+    fn drop_stated(&mut self, drive: Drive) {
+        let is_new = |x: &f64, stated: f64| (x - stated).abs() > SAME * stated.abs();
+        self.damping = self.damping.filter(|x| is_new(x, drive.damping));
+        self.friction = self.friction.filter(|x| is_new(x, drive.friction));
+        self.armature = self.armature.filter(|x| is_new(x, drive.rotor_inertia));
+        let is_new_spring =
+            |[k, rest]: &[f64; 2]| is_new(k, drive.stiffness) || is_new(rest, drive.rest);
+        self.spring = self.spring.filter(is_new_spring);
+    }
+
+    fn add(&mut self, quantity: Quantity) {
+        let add = |to: &mut Option<f64>, x: f64| *to = Some(to.unwrap_or(0.0) + x);
+        match quantity {
+            Quantity::Damping(x) => add(&mut self.damping, x),
+            Quantity::DryFriction(x) => add(&mut self.friction, x),
+            Quantity::StaticFriction(x) => add(&mut self.static_friction, x),
+            Quantity::Armature(x) => add(&mut self.armature, x),
+            Quantity::Zero(x) => add(&mut self.zero, x),
+            Quantity::Spring { stiffness, rest } => {
+                // Two springs pull as one with the sum of both stiffnesses.
+                let [k, at] = self.spring.unwrap_or_default();
+                let sum = k + stiffness;
+                let at = if sum > 0.0 {
+                    (k * at + stiffness * rest) / sum
+                } else {
+                    0.0
+                };
+                self.spring = Some([sum, at]);
+            }
+            Quantity::Body | Quantity::Gravity => {}
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! `tauscope export`.
+
+use std::path::{Path, PathBuf};
+
+use tauscope_archive::whole_file::{self, Existing};
+use tauscope_pipeline::report::Problem;
+use tauscope_report::models::{self, Corrections, TARGETS, Target};
+use tauscope_session::robot::{self, Robot, Source};
+use tauscope_twin::TwinFile;
+
+use crate::existing::Force;
+use crate::exit::{Exit, Failure};
+use crate::output::Output;
+
+/// Write the corrections of a report into a simulator's own file.
+///
+/// What the simulator cannot say is listed, in the file's first lines, too.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The folder that `explain` wrote.
+    report: PathBuf,
+    /// What to write.
+    #[arg(long, value_name = "SIMULATOR", value_parser = target)]
+    to: Target,
+    /// The model that is corrected: everything else in it stays as it is. By default the robot that was explained.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// The new file.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    #[command(flatten)]
+    force: Force,
+}
+
+fn target(name: &str) -> Result<Target, String> {
+    Target::named(name).ok_or_else(|| {
+        let names = TARGETS.map(Target::name).join(", ");
+        format!("there is no simulator `{name}`; there are {names}")
+    })
+}
+
+/// Writes it.
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
+    let twin_path = args.report.join("twin.yaml");
+    let text = std::fs::read_to_string(&twin_path).map_err(|error| {
+        let title = format!(
+            "{}: {error}. A report without a verdict has no corrections",
+            twin_path.display()
+        );
+        Failure::rejected(title)
+    })?;
+    let twin: TwinFile = serde_saphyr::from_str(&text).map_err(|error| {
+        Failure::Rejected(Problem::of_file(&twin_path, error.to_string()).into())
+    })?;
+    refuse_unknown_scales(&twin)?;
+    let explained = robot_of(&twin);
+    let model_path = args.model.as_ref().or(explained.as_ref());
+    let is_robot = args.to != Target::Sdf;
+    let robot_path = if is_robot {
+        model_path
+    } else {
+        explained.as_ref()
+    };
+    let Some(robot_path) = robot_path else {
+        return Err(Failure::rejected(
+            "the report does not say which robot it explains: give its file with --model FILE"
+                .to_owned(),
+        ));
+    };
+    let inputs = [Some(robot_path), args.model.as_ref()];
+    args.force
+        .check_beside([args.out.clone()], inputs.into_iter().flatten())?;
+    let robot = robot::read(robot_path).map_err(|error| {
+        Failure::Rejected(Problem::of_file(robot_path, error.to_string()).into())
+    })?;
+    let source = source(args, robot_path, &robot)?;
+    let corrections = Corrections::of(&robot.model, &twin.terms);
+    let written = models::write(args.to, &source, &robot.urdf, &corrections)
+        .map_err(|error| Failure::rejected(error.to_string()))?;
+    whole_file::write(&args.out, written.text.as_bytes(), Existing::Replace).map_err(|error| {
+        Failure::Rejected(Problem::of_file(&args.out, format!("cannot write: {error}")).into())
+    })?;
+    let mut lines: Vec<String> = written
+        .written
+        .iter()
+        .map(|line| format!("written: {line}"))
+        .collect();
+    lines.extend(
+        written
+            .lost
+            .iter()
+            .map(|line| format!("not written, or only nearly: {line}")),
+    );
+    if lines.is_empty() {
+        lines.push("nothing to correct: the model is written as it is".to_owned());
+    }
+    lines.push(format!("\nwrote {}", args.out.display()));
+    out.print(&lines.join("\n"))?;
+    Ok(Exit::Done)
+}
+
+/// Where the robot of a report lies, as far as it says.
+fn robot_of(twin: &TwinFile) -> Option<PathBuf> {
+    twin.provenance.get("robot").map(PathBuf::from)
+}
+
+/// The text that is corrected.
+fn source(args: &Args, robot_path: &Path, robot: &Robot) -> Result<String, Failure> {
+    if args.to == Target::IsaacLab {
+        return Ok(String::new());
+    }
+    if args.to == Target::Sdf {
+        let Some(path) = &args.model else {
+            return Err(Failure::rejected(
+                "an SDF is corrected in place: give it with --model FILE".to_owned(),
+            ));
+        };
+        return std::fs::read_to_string(path)
+            .map_err(|error| Failure::Rejected(Problem::of_file(path, error.to_string()).into()));
+    }
+    match robot::source(robot_path) {
+        Ok(Source::Mjcf(text)) => Ok(text),
+        // With plausible bodies in place of impossible ones, as the twin has them.
+        Ok(Source::Urdf(_)) => Ok(robot.urdf.clone()),
+        Err(error) => Err(Failure::Rejected(
+            Problem::of_file(robot_path, error.to_string()).into(),
+        )),
+    }
+}
+
+/// Refuses a twin whose efforts are in a unit that no simulator has.
+fn refuse_unknown_scales(twin: &TwinFile) -> Result<(), Failure> {
+    let is_scaled =
+        |joint: &tauscope_twin::JointCorrection| (joint.gain - 1.0).abs() > f64::EPSILON;
+    if twin.effort_unit == "A" && twin.joints.values().any(is_scaled) {
+        return Err(Failure::rejected(
+            "the twin's efforts are in A, and simulators compute in N m: explain the recordings with --torque-constant for all joints"
+                .to_owned(),
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,221 @@
+"""Proof in the simulator itself: what `explain` writes into a MuJoCo model, simulated again.
+
+    python3 tests/simulators/prove.py TAUSCOPE OUT [--cases arm7,folded] [--table]
+
+Needs requirements.txt. Each case is a model of models/ in which three things are changed in secret: the plant. It follows motions under a
+controller of joint torques, and is recorded: positions, velocities and efforts with noise, 250 Hz. `explain` gets the model without the
+changes and the recordings, and writes robot.xml. Then, for the recording that nothing was fitted on:
+
+- inverse dynamics: RMS of measured effort less that of mj_inverse, with the model as it was and as it was written;
+- rollout: the model under the recorded commands and the same controller; RMS of its positions less the measured ones.
+
+What is there already is not made again.
+"""
+import argparse
+import dataclasses
+import json
+import pathlib
+import shutil
+import subprocess
+
+import mujoco
+import numpy as np
+
+MODELS = pathlib.Path(__file__).parent / "models"
+RATE_HZ, STEP_S, LENGTH_S, RECORDINGS = 250, 0.001, 14., 5
+HELD_OUT = RECORDINGS - 1
+
+# By case: the model, and what is changed in the plant: (attribute, joint or body, what is added).
+CASES = {
+    "arm7": ("arm7", [("frictionloss", "j2", 2.5), ("armature", "j4", 0.25), ("mass", "flange", 1.4)]),
+    "arm7_spring": ("arm7", [("stiffness", "j3", 9.), ("damping", "j1", 4.), ("frictionloss", "j6", 0.8)]),
+    "folded": ("folded", [("mass", "turn", 0.5), ("damping", "elbow", 0.8), ("frictionloss", "shoulder", 1.5)]),
+    "gantry": ("gantry", [("frictionloss", "rail", 15.), ("damping", "tilt", 0.6), ("mass", "boom", 0.7)]),
+    "quadruped": ("quadruped", [("frictionloss", "FL_knee", 0.6), ("armature", "RR_hip", 0.03), ("mass", "RL_calf", 0.25)]),
+}
+
+
+@dataclasses.dataclass
+class Run:
+    """A recording: rows of time, position, velocity, acceleration, effort and command, the joints in the model's order."""
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    effort: np.ndarray
+
+
+def load(path):
+    m = mujoco.MjModel.from_xml_path(str(path))
+    m.opt.timestep = STEP_S
+    # The controller's torques take the place of the model's own drives.
+    m.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    return m
+
+
+def concealed(m, changes):
+    """The model with the changes."""
+    for attribute, name, more in changes:
+        if attribute == "mass":
+            body = m.body(name).id
+            # A lump at the body's centre of mass, a little away along x.
+            scale = 1 + more / m.body_mass[body]
+            m.body_mass[body] *= scale
+            m.body_inertia[body] *= scale
+        else:
+            joint = m.joint(name).id
+            dof = m.jnt_dofadr[joint]
+            {"frictionloss": m.dof_frictionloss, "damping": m.dof_damping, "armature": m.dof_armature}.get(
+                attribute, m.jnt_stiffness)[joint if attribute == "stiffness" else dof] += more
+    mujoco.mj_setConst(m, mujoco.MjData(m))
+    return m
+
+
+class Controller:
+    """Joint torques of a PD controller with the gravity of the model as it was, as a robot's own controller has it."""
+
+    def __init__(self, nominal):
+        d = mujoco.MjData(nominal)
+        full = np.zeros((nominal.nv, nominal.nv))
+        mujoco.mj_forward(nominal, d)
+        mujoco.mj_fullM(nominal, full, d.qM) if hasattr(d, "qM") else mujoco.mj_fullM(nominal, d, full)
+        inertia = np.diag(full)
+        self.kp, self.kd = inertia * 25.0**2, inertia * 2 * 0.9 * 25.0
+        self.nominal, self.data = nominal, mujoco.MjData(nominal)
+
+    def torque(self, q, v, command):
+        self.data.qpos[:], self.data.qvel[:] = q, 0
+        mujoco.mj_fwdPosition(self.nominal, self.data)
+        mujoco.mj_fwdVelocity(self.nominal, self.data)
+        return self.kp * (command - q) - self.kd * v + self.data.qfrc_bias
+
+
+def commands(m, rng):
+    """Finite Fourier series of each joint within its range [rad or m], by step."""
+    t = np.arange(int(LENGTH_S / STEP_S)) * STEP_S
+    out = np.empty((len(t), m.nv))
+    for j in range(m.njnt):
+        low, high = m.jnt_range[j] if m.jnt_limited[j] else (-1.5, 1.5)
+        wave = sum(rng.uniform(0.3, 1) / (k + 1) * np.sin(2 * np.pi * f * t + rng.uniform(0, 6.28))
+                   for k, f in enumerate(rng.uniform((0.08, 0.2, 0.4), (0.15, 0.35, 0.7))))
+        out[:, j] = (low + high) / 2 + 0.32 * (high - low) * wave / np.abs(wave).max()
+    return out
+
+
+def simulate(m, controller, command):
+    """The motion of a model under commands."""
+    d = mujoco.MjData(m)
+    d.qpos[:] = command[0]
+    every, rows = int(round(1 / RATE_HZ / STEP_S)), []
+    for k, at in enumerate(command):
+        d.qfrc_applied[:] = controller.torque(d.qpos, d.qvel, at)
+        mujoco.mj_forward(m, d)
+        if k % every == 0:
+            rows.append((k * STEP_S, d.qpos.copy(), d.qvel.copy(), d.qacc.copy(), d.qfrc_applied.copy()))
+        mujoco.mj_step(m, d)
+    return Run(*(np.array(x) for x in zip(*rows)))
+
+
+def write(path, m, run, rng):
+    """A table with noise of encoders and sensors."""
+    names = [m.joint(j).name for j in range(m.njnt)]
+    size = np.sqrt(np.mean(run.effort**2, 0))
+    q = run.position + 1e-5 * rng.standard_normal(run.position.shape)
+    v = run.velocity + 1e-3 * rng.standard_normal(run.position.shape)
+    e = run.effort + 0.005 * size * rng.standard_normal(run.position.shape)
+    head = ["time"] + [f"{n}.{kind}" for n in names for kind in ("position", "velocity", "effort")]
+    body = np.column_stack([run.time] + [x[:, j] for j in range(m.njnt) for x in (q, v, e)])
+    np.savetxt(path, body, delimiter=",", header=",".join(head), comments="", fmt="%.9g")
+
+
+def make(out, name, seed):
+    """Recordings of a case."""
+    model, changes = CASES[name]
+    folder = out / name
+    folder.mkdir(parents=True, exist_ok=True)
+    for file in MODELS.glob(f"{model}*.xml"):
+        shutil.copy(file, folder)
+    controller = Controller(load(MODELS / f"{model}.xml"))
+    plant = concealed(load(MODELS / f"{model}.xml"), changes)
+    rng = np.random.default_rng(seed)
+    for k in range(RECORDINGS):
+        command = commands(plant, rng)
+        run = simulate(plant, controller, command)
+        write(folder / f"rec_{k}.csv", plant, run, rng)
+        np.savez_compressed(folder / f"rec_{k}.npz", command=command, **dataclasses.asdict(run))
+
+
+def explain(program, folder, model):
+    fit = [str(folder / f"rec_{k}.csv") for k in range(RECORDINGS) if k != HELD_OUT]
+    command = [program, "explain", "--fit", *fit, "--holdout", str(folder / f"rec_{HELD_OUT}.csv"), "--robot",
+               str(folder / f"{model}.xml"), "--out", str(folder / "report"), "--force"]
+    subprocess.run(command, check=True, capture_output=True, text=True)
+
+
+def inverse_rms(m, run):
+    """RMS by joint of the effort less that which the motion needs, where the joint moves."""
+    d, left = mujoco.MjData(m), []
+    for q, v, a, e in zip(run.position, run.velocity, run.acceleration, run.effort):
+        d.qpos[:], d.qvel[:], d.qacc[:] = q, v, a
+        mujoco.mj_inverse(m, d)
+        left.append(e - d.qfrc_inverse)
+    return np.sqrt(np.mean(np.square(left), 0))
+
+
+def judge(folder, name):
+    """Errors of a case on its held-out recording: as it was, and as it was written."""
+    model, changes = CASES[name]
+    kept = np.load(folder / f"rec_{HELD_OUT}.npz")
+    run = Run(*(kept[f.name] for f in dataclasses.fields(Run)))
+    controller = Controller(load(folder / f"{model}.xml"))
+    report = json.loads((folder / "report" / "report.json").read_text())
+    errors = []
+    written = folder / "report" / "robot.xml"
+    for path in (folder / f"{model}.xml", written if written.exists() else folder / f"{model}.xml"):
+        m = load(path)
+        rollout = simulate(m, controller, kept["command"])
+        errors.append((inverse_rms(m, run), np.sqrt(np.mean((rollout.position - run.position)**2, 0))))
+    said = [np.array(report[key]) for key in ("holdout_rms_before", "holdout_rms_after")]
+    found = [f"{f['effect']}@{f['joint'] or f['link'] or 'tool'}" for f in report["findings"]]
+    return {"case": name, "changes": changes, "found": found, "verdict": report["verdict"],
+            "inverse": [e[0].tolist() for e in errors], "rollout": [e[1].tolist() for e in errors],
+            "said": [x.tolist() for x in said], "written": written.exists()}
+
+
+def table(results):
+    lines = ["| case | concealed | found | inverse dynamics, before and after [N m] | by the report | rollout, before and after [mrad] | worse joints |",
+             "| --- | --- | --- | --- | --- | --- | --- |"]
+    ratios = []
+    for r in results:
+        rms = lambda x: float(np.sqrt(np.mean(np.square(x))))
+        (ib, ia), (rb, ra), (sb, sa) = ([rms(x) for x in r[key]] for key in ("inverse", "rollout", "said"))
+        worse = sum(a > b * 1.02 + 1e-6 for b, a in zip(*r["rollout"]))
+        ratios.append(ra / rb)
+        changes = ", ".join(f"{a} {n} +{x:g}" for a, n, x in r["changes"])
+        lines.append(f"| {r['case']} | {changes} | {', '.join(r['found'])} | {ib:.3f}, {ia:.3f} | {sb:.3f}, {sa:.3f} | "
+                     f"{1e3 * rb:.2f}, {1e3 * ra:.2f} | {worse} of {len(r['rollout'][0])} |")
+    return "\n".join(lines) + f"\n\nThe rollout's error falls to {np.median(ratios):.3f} of what it was in the median of {len(ratios)} cases."
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tauscope")
+    parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("--cases", default=",".join(CASES))
+    parser.add_argument("--seed", type=int, default=11)
+    parser.add_argument("--table", action="store_true", help="only print the table of what is there")
+    args = parser.parse_args()
+    results = []
+    for name in args.cases.split(","):
+        folder = args.out / name
+        if not args.table:
+            if not (folder / f"rec_{HELD_OUT}.npz").exists():
+                make(args.out, name, [args.seed, list(CASES).index(name)])
+            if not (folder / "report" / "report.json").exists():
+                explain(args.tauscope, folder, CASES[name][0])
+        results.append(judge(folder, name))
+    print(table(results))
+
+
+if __name__ == "__main__":
+    main()
