@@ -16,6 +16,7 @@ mod doctor;
 mod durable;
 mod evaluate;
 mod explain;
+mod export;
 mod fleet;
 mod formats;
 mod independent_reader;

@@ -45,6 +45,7 @@ use margins::margins;
 pub use margins::{AS_LIKELY, Alternative};
 use nuisance::{Nuisance, Size};
 use objective::{Objective, Set};
+use predictions::Predictions;
 use space::Space;
 use state::{State, disfavour};
 use step::{Step, Taken};
@@ -120,7 +121,8 @@ pub fn infer(
         if is_settled || round == ROUNDS {
             let all = effects(&solution.fit);
             let (margins, alternatives) = margins(&objective, &taken.set, &all);
-            let residuals = predictions::residuals(problem, &space, &solution.fit, &state.efforts);
+            let predictions = Predictions::of(problem, &space, &solution.fit, &state.efforts);
+            let residuals = predictions.as_ref().map(Predictions::residuals);
             let residuals = residuals.unwrap_or_default();
             let features = remainder::features(problem, &solution.fit);
             return Inferred {
@@ -129,13 +131,9 @@ pub fn infer(
                 alternatives,
                 smallest: around::smallest(&objective, &taken.set),
                 bodies: nuisance::mean_bodies(&nuisances, solution.nuisances.as_slice()),
-                unpredictive: predictions::unpredictive(
-                    problem,
-                    &space,
-                    &solution.fit,
-                    &state.efforts,
-                    &residuals,
-                ),
+                unpredictive: predictions.map_or_else(Vec::new, |predictions| {
+                    predictions.unpredictive(&solution.fit)
+                }),
                 remaining: remainder::predicted(&space, &residuals, &features),
                 fit: solution.fit,
             };

@@ -28,7 +28,7 @@ fn empty(verdict: Verdict) -> Report {
     }
 }
 
-fn finding(effect: &str, sentence: &str) -> Finding {
+pub fn finding(effect: &str, sentence: &str) -> Finding {
     Finding {
         effect: effect.to_owned(),
         joint: Some("joint1".to_owned()),

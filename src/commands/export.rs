@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use tauscope_archive::whole_file::{self, Existing};
+use tauscope_explain::report::Report;
 use tauscope_pipeline::report::Problem;
 use tauscope_report::models::{self, Corrections, TARGETS, Target};
 use tauscope_session::robot::{self, Robot, Source};
@@ -52,6 +53,10 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let twin: TwinFile = serde_saphyr::from_str(&text).map_err(|error| {
         Failure::Rejected(Problem::of_file(&twin_path, error.to_string()).into())
     })?;
+    let report_path = args.report.join("report.json");
+    let broken = |error: String| Failure::Rejected(Problem::of_file(&report_path, error).into());
+    let text = std::fs::read_to_string(&report_path).map_err(|error| broken(error.to_string()))?;
+    let report: Report = serde_json::from_str(&text).map_err(|error| broken(error.to_string()))?;
     refuse_unknown_scales(&twin)?;
     let explained = robot_of(&twin);
     let model_path = args.model.as_ref().or(explained.as_ref());
@@ -74,7 +79,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         Failure::Rejected(Problem::of_file(robot_path, error.to_string()).into())
     })?;
     let source = source(args, robot_path, &robot)?;
-    let corrections = Corrections::of(&robot.model, &twin.terms);
+    let corrections = Corrections::of(&robot.model, &twin.terms, &report.findings);
     let written = models::write(args.to, &source, &robot.urdf, &corrections)
         .map_err(|error| Failure::rejected(error.to_string()))?;
     whole_file::write(&args.out, written.text.as_bytes(), Existing::Replace).map_err(|error| {

@@ -234,7 +234,7 @@ fn robot_text(
     let mut offsets = kept.start.iter().flat_map(|start| &start.offset);
     let is_bare = gains.all(|gain| (gain - 1.0).abs() < f64::EPSILON)
         && offsets.all(|offset| offset.abs() < f64::EPSILON);
-    let corrections = Corrections::of(&kept.model, &outcome.terms);
+    let corrections = Corrections::of(&kept.model, &outcome.terms, &outcome.report.findings);
     if !is_bare || corrections.is_empty() {
         return None;
     }

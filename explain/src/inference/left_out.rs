@@ -91,12 +91,24 @@ impl<'a> LeftOut<'a> {
         DMatrix::from_fn(count, count, |a, b| products[a.max(b)][a.min(b)])
     }
 
-    /// Whitened residual of a joint in a piece, with the coefficients of the others.
-    pub fn residual(&self, joint: usize, piece: usize) -> DVector<f64> {
+    /// Number of nuisances: the columns begin behind them.
+    pub fn nuisances(&self) -> usize {
+        self.space.nuisances.len()
+    }
+
+    /// Whitened residual of a joint in a piece, with the coefficients that the other pieces give the columns for which
+    /// `is_counted` holds.
+    pub fn residual(
+        &self,
+        joint: usize,
+        piece: usize,
+        is_counted: &dyn Fn(usize) -> bool,
+    ) -> DVector<f64> {
         let p = self.columns.len() - 1;
         let measured = self.part(p, joint, piece).unwrap_or_default();
         let mut left = DVector::from_column_slice(measured);
-        for (a, number) in self.without[piece].1.iter().enumerate() {
+        let numbers = self.without[piece].1.iter().enumerate();
+        for (a, number) in numbers.filter(|(a, _)| is_counted(*a)) {
             let values = self.part(a, joint, piece).unwrap_or_default();
             left.iter_mut()
                 .zip(values)

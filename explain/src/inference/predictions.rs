@@ -5,7 +5,6 @@ use nalgebra::DVector;
 use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
-use crate::physics::active::Active;
 
 use super::left_out::LeftOut;
 use super::prior::Magnitude;
@@ -40,49 +39,79 @@ pub fn tangents(problem: &Problem, fit: &Fit, efforts: &[Magnitude]) -> (Vec<Col
     (columns, measured)
 }
 
-/// Whitened residuals in pieces of recordings that are left out of a fit in turn, by joint and piece.
-pub fn residuals(
-    problem: &Problem,
-    space: &Space,
-    fit: &Fit,
-    efforts: &[Magnitude],
-) -> Option<Vec<Vec<DVector<f64>>>> {
-    let pieces = rows::pieces(problem);
-    let (columns, measured) = tangents(problem, fit, efforts);
-    let left_out = LeftOut::new(space, &columns, &measured, pieces)?;
-    let of_joint = |joint: usize| {
-        let of_piece = |piece: usize| left_out.residual(joint, piece);
-        (0..pieces).map(of_piece).collect()
-    };
-    Some((0..problem.joints).map(of_joint).collect())
+/// Predictions of a fit in pieces of recordings that are left out of it in turn.
+pub struct Predictions<'a> {
+    left_out: LeftOut<'a>,
+    /// By column of the effects, whether its effect lasts.
+    lasts: Vec<bool>,
+    pieces: usize,
+    joints: usize,
 }
 
-/// Joints whose residuals in pieces that are left out of the fit are smaller without the effects that last.
-pub fn unpredictive(
-    problem: &Problem,
-    space: &Space,
-    fit: &Fit,
-    efforts: &[Magnitude],
-    residuals: &[Vec<DVector<f64>>],
-) -> Vec<usize> {
-    let lasts =
-        |active: &&Active| active.hypothesis.lasts() && !active.hypothesis.is_torque_scale();
-    let (lasting, others): (Vec<&Active>, Vec<&Active>) = fit.actives.iter().partition(lasts);
-    let feels = |joint: &usize| {
-        let mut only = lasting.iter().map(|active| active.hypothesis.only_joint());
-        only.any(|only| only.is_none_or(|own| own == *joint))
-    };
-    let others = others.into_iter().cloned().collect();
-    let without = Fit::beside(problem, others, Some(fit));
-    let Some(without) = self::residuals(problem, space, &without, efforts) else {
-        return Vec::new();
-    };
-    let square =
-        |of_joint: &[DVector<f64>]| of_joint.iter().map(DVector::norm_squared).sum::<f64>();
-    let pairs = residuals.iter().zip(&without).enumerate();
-    pairs
-        .filter(|(_, (with, without))| square(with) >= square(without))
-        .map(|(joint, _)| joint)
-        .filter(feels)
-        .collect()
+impl<'a> Predictions<'a> {
+    /// Those of a fit; nothing where a normal matrix cannot be factored.
+    pub fn of(
+        problem: &Problem,
+        space: &'a Space,
+        fit: &Fit,
+        efforts: &[Magnitude],
+    ) -> Option<Self> {
+        let pieces = rows::pieces(problem);
+        let (columns, measured) = tangents(problem, fit, efforts);
+        let given = variants::of_fit(problem, fit, efforts);
+        let lasts = given.iter().flat_map(|given| {
+            let hypothesis = given.variant.hypothesis;
+            let lasts = hypothesis.lasts() && !hypothesis.is_torque_scale();
+            given.factors.iter().map(move |_| lasts)
+        });
+        Some(Self {
+            lasts: lasts.collect(),
+            left_out: LeftOut::new(space, &columns, &measured, pieces)?,
+            pieces,
+            joints: problem.joints,
+        })
+    }
+
+    /// Whitened residuals by joint and piece.
+    pub fn residuals(&self) -> Vec<Vec<DVector<f64>>> {
+        let of_piece = |joint, piece| self.left_out.residual(joint, piece, &|_| true);
+        self.by_joint(&of_piece)
+    }
+
+    /// Joints whose effort is predicted no better with the effects that last than without them. A twin has no nuisances, so
+    /// they predict nothing here.
+    pub fn unpredictive(&self, fit: &Fit) -> Vec<usize> {
+        let feels = |joint: &usize| {
+            let lasting = fit.actives.iter().map(|active| active.hypothesis);
+            let mut lasting = lasting.filter(|h| h.lasts() && !h.is_torque_scale());
+            lasting.any(|h| h.only_joint().is_none_or(|own| own == *joint))
+        };
+        let nuisances = self.left_out.nuisances();
+        let of_effects = |joint, piece| {
+            let is_effect = |column: usize| column >= nuisances;
+            self.left_out.residual(joint, piece, &is_effect)
+        };
+        let without = |joint, piece| {
+            let passes = |column: usize| column >= nuisances && !self.lasts[column - nuisances];
+            self.left_out.residual(joint, piece, &passes)
+        };
+        let square =
+            |of_joint: &[DVector<f64>]| of_joint.iter().map(DVector::norm_squared).sum::<f64>();
+        let (with, without) = (self.by_joint(&of_effects), self.by_joint(&without));
+        let pairs = with.iter().zip(&without).enumerate();
+        pairs
+            .filter(|(_, (with, without))| square(with) >= square(without))
+            .map(|(joint, _)| joint)
+            .filter(feels)
+            .collect()
+    }
+
+    fn by_joint(&self, of_piece: &dyn Fn(usize, usize) -> DVector<f64>) -> Vec<Vec<DVector<f64>>> {
+        let of_joint = |joint| {
+            (0..self.pieces)
+                .map(|piece| of_piece(joint, piece))
+                .collect()
+        };
+        (0..self.joints).map(of_joint).collect()
+    }
 }

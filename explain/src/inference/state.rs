@@ -1,7 +1,7 @@
 //! Noise, heavy tails and the scales of nuisances, estimated along with an explanation.
 
 use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::terms::sign;
+use tauscope_dynamics::terms::{COULOMB_FRICTION, Effect, VISCOUS_FRICTION, sign};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
@@ -243,7 +243,19 @@ fn friction_rms(problem: &Problem, fit: &Fit, rows: &Rows, joint: usize) -> f64 
     let y = if problem.is_foreign {
         rows.pick(&problem.measured[problem.joint_rows(joint)])
     } else {
-        rows.pick(&variants::measured(problem, fit).values[problem.joint_rows(joint)])
+        // The twin that the explanation starts from may have most of it.
+        let known = |effect: &Effect| {
+            let known = problem.known_friction[joint].get(effect.name);
+            known.copied().unwrap_or(0.0)
+        };
+        let known = [known(&COULOMB_FRICTION), known(&VISCOUS_FRICTION)];
+        let left = rows.pick(&variants::measured(problem, fit).values[problem.joint_rows(joint)]);
+        let stated = columns[0].iter().zip(&columns[1]);
+        let stated = stated.map(|(sign, speed)| known[0] * sign + known[1] * speed);
+        left.iter()
+            .zip(stated)
+            .map(|(left, stated)| left + stated)
+            .collect()
     };
     let y = DVector::from_vec(y);
     let normal = matrix.tr_mul(&matrix);

@@ -32,7 +32,7 @@ pub fn tempers(
             .map(|column| space.whitened_by_piece(joint, column, pieces))
             .collect();
         let of_piece = |piece: usize| {
-            let residual = left_out.residual(joint, piece);
+            let residual = left_out.residual(joint, piece, &|_| true);
             let features = DMatrix::from_fn(residual.len(), own.len(), |k, c| own[c][piece][k]);
             let covariance = left_out.covariance(joint, piece, &features);
             let eigen = SymmetricEigen::new(covariance);

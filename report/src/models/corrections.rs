@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use tauscope_dynamics::terms::{Quantity, TermSpec};
 use tauscope_dynamics::{Drive, Inertia, Model};
+use tauscope_explain::report::Finding;
 
 /// Smallest change of a direction of gravity that counts \[m/s²\]. Resolution: of a file with seven digits.
 const LEAST_GRAVITY_M_S2: f64 = 1e-6;
@@ -44,8 +45,9 @@ pub struct Corrections {
 }
 
 impl Corrections {
-    /// What these terms ask of the model of a robot. Terms of the same kind add up.
-    pub fn of(model: &Model, terms: &[TermSpec]) -> Self {
+    /// What these terms ask of the model of a robot. Terms of the same kind add up. Of bodies, those that `findings` name
+    /// count: a twin also has the usual errors of all others, which are no correction.
+    pub fn of(model: &Model, terms: &[TermSpec], findings: &[Finding]) -> Self {
         let mut all = Self::default();
         let mut turned = model.clone();
         for spec in terms {
@@ -66,7 +68,7 @@ impl Corrections {
             };
             for quantity in quantities {
                 match quantity {
-                    Quantity::Body => all.add_body(model, spec),
+                    Quantity::Body => all.add_body(model, spec, findings),
                     Quantity::Gravity => {
                         if let Ok(term) = spec.build(model) {
                             term.alter(&mut turned);
@@ -105,11 +107,24 @@ impl Corrections {
         self.joints.is_empty() && self.bodies.is_empty() && self.gravity.is_none()
     }
 
-    fn add_body(&mut self, model: &Model, spec: &TermSpec) {
+    fn add_body(&mut self, model: &Model, spec: &TermSpec, findings: &[Finding]) {
         let Some((link, change)) = spec.build(model).ok().and_then(|term| term.inertia()) else {
             return;
         };
         let link = &model.links()[link];
+        let mover = link.joint.map(|joint| &model.joints()[joint].name);
+        let names = |finding: &Finding| {
+            let is_mover = finding.joint.is_some() && finding.joint.as_ref() == mover;
+            let is_there = finding.link.as_ref() == Some(&link.name) || is_mover;
+            is_there
+                && spec
+                    .parameters
+                    .keys()
+                    .all(|name| finding.parameters.contains_key(name))
+        };
+        if !findings.iter().any(names) {
+            return;
+        }
         self.before.insert(link.name.clone(), link.inertia);
         let own = self.bodies.entry(link.name.clone()).or_insert(link.inertia);
         *own += change;

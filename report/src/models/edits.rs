@@ -111,9 +111,9 @@ pub fn child<'a, 'i>(node: Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
     node.children().find(|child| child.has_tag_name(tag))
 }
 
-/// A number with as many digits as it needs and no more than nine.
+/// A number with as many digits as it needs and no more than twelve.
 pub fn digits(x: f64) -> String {
-    let text = format!("{x:.8e}");
+    let text = format!("{x:.11e}");
     text.parse::<f64>().map_or(text, |x| x.to_string())
 }
 

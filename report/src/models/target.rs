@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use tauscope_dynamics::terms::words::number;
+
 use super::corrections::Corrections;
 
 /// A simulator's file.
@@ -163,7 +165,7 @@ impl Target {
             ];
             for (k, value) in values.into_iter().enumerate() {
                 if let Some(value) = value {
-                    let value = super::edits::digits(value);
+                    let value = number(value);
                     say(k, format!("{} of {joint}, {value}", QUANTITIES[k]));
                 }
             }
@@ -173,12 +175,12 @@ impl Target {
                 .before
                 .get(link)
                 .map_or(0.0, |body| body.mass_kg());
-            let mass = super::edits::digits(body.mass_kg());
+            let mass = number(body.mass_kg());
             say(
                 6,
                 format!(
                     "mass of {link}, {mass} kg in place of {} kg",
-                    super::edits::digits(before)
+                    number(before)
                 ),
             );
         }

@@ -2,6 +2,7 @@
 
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::TermSpec;
+use tauscope_explain::report::Finding;
 
 use super::*;
 
@@ -49,7 +50,20 @@ const SDF: &str = r#"<sdf version="1.9">
 
 fn corrections(json: &str) -> Corrections {
     let terms: Vec<TermSpec> = serde_json::from_str(json).unwrap();
-    Corrections::of(&Model::from_urdf(ROBOT).unwrap(), &terms)
+    // A body counts where a finding names it.
+    let finding = |spec: &TermSpec| {
+        let at_link = spec.joint.is_none();
+        let link = spec.link.clone().or(at_link.then(|| "tool".to_owned()));
+        let parameters = serde_json::to_value(&spec.parameters).unwrap();
+        Finding {
+            joint: spec.joint.clone(),
+            link,
+            parameters: serde_json::from_value(parameters).unwrap(),
+            ..crate::tests::finding(&spec.effect, "")
+        }
+    };
+    let findings: Vec<Finding> = terms.iter().map(finding).collect();
+    Corrections::of(&Model::from_urdf(ROBOT).unwrap(), &terms, &findings)
 }
 
 const OF_JOINT: &str = r#"[
@@ -143,7 +157,7 @@ fn bodies_are_what_the_terms_say_in_every_format() {
     assert!(sdf.text.contains("<damping>1.25</damping>"), "{}", sdf.text);
     assert!(
         sdf.text
-            .contains("<spring_reference>1.57079633</spring_reference>"),
+            .contains("<spring_reference>1.57079632679</spring_reference>"),
         "{}",
         sdf.text
     );
@@ -186,7 +200,7 @@ fn a_zero_is_moved_as_the_joint_turns() {
     assert!((effort(&new) - effort(&shifted)).abs() < 1e-6);
     let mjcf = write(Target::Mjcf, MJCF, ROBOT, &all).unwrap();
     assert!(
-        mjcf.text.contains("<joint ref=\"-11.4591559\""),
+        mjcf.text.contains("<joint ref=\"-11.4591559026"),
         "{}",
         mjcf.text
     );
