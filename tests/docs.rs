@@ -99,6 +99,19 @@ fn the_bundled_files_pass_the_check() {
     assert_eq!(Out::of(command).code, 0);
 }
 
+/// The tables of simulators stand behind the mark and end the page.
+#[test]
+fn the_page_of_simulators_has_the_tables_of_the_effects() {
+    let path = root().join("docs/simulators.md");
+    let page = std::fs::read_to_string(&path).unwrap();
+    let tables = tauscope_report::models::table();
+    let (_, found) = page.split_once("## What simulators can say\n\n").unwrap();
+    assert!(
+        found == tables,
+        "docs/simulators.md is behind the effects; its last section is to be:\n{tables}"
+    );
+}
+
 #[test]
 fn the_page_of_keys_is_what_the_program_says() {
     let page = std::fs::read_to_string(root().join("docs/keys.md")).unwrap();

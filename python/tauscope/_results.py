@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import html
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypedDict
 
+from ._errors import InputError
+from ._process import PathLike, run
 from ._tauscope import Table
 
 Verdict = Literal["explained", "nothing_missing", "unknown_remains", "not_evaluated"]
+
+
+Simulator = Literal["urdf", "mjcf", "sdf", "isaaclab", "drake"]
+_SIMULATORS: dict[str, Simulator] = {".xml": "mjcf", ".urdf": "urdf", ".sdf": "sdf", ".py": "isaaclab"}
 
 
 class Finding(TypedDict):
@@ -76,6 +83,23 @@ class Explanation(Result):
         joints = self.report["joints"]
         numbers = [self.report.get(column) or [None] * len(joints) for column in columns]
         return Table.of_numbers("joint", joints, columns, numbers)
+
+    def write_model(
+        self, out: PathLike, *, to: Simulator | None = None, model: PathLike | None = None, force: bool = False
+    ) -> list[str]:
+        """Writes the corrections into a simulator's own file: by default the robot that was explained, corrected.
+
+        `to` follows from the ending of `out` if it is left out: `.xml` is MuJoCo's, `.urdf`, `.sdf`, and `.py` Isaac Lab's. Gives the
+        lines that say what was written, and what the simulator cannot say.
+        """
+        name = to or _SIMULATORS.get(Path(out).suffix)
+        if name is None:
+            raise InputError(f"the ending of {os.fspath(out)} names no simulator: give `to`")
+        options: list[PathLike] = ["--to", name, "--out", out]
+        options += [] if model is None else ["--model", model]
+        options += ["--force"] if force else []
+        answer = run(["export", *options, "--", self.folder])
+        return [line for line in answer.text.splitlines() if line]
 
     def __repr__(self) -> str:
         return f"<tauscope.Explanation: {self.verdict}, {len(self.findings)} findings, {self.report_path}>"

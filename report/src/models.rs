@@ -8,6 +8,7 @@ mod edits;
 mod isaac_lab;
 mod mjcf;
 mod sdf;
+mod table;
 mod target;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
@@ -15,6 +16,7 @@ mod tests;
 mod urdf;
 
 pub use corrections::{Corrections, JointCorrections};
+pub use table::table;
 pub use target::{Place, TARGETS, Target};
 
 /// Why a model cannot be written.

@@ -169,17 +169,18 @@ def judge(folder, name):
     run = Run(*(kept[f.name] for f in dataclasses.fields(Run)))
     controller = Controller(load(folder / f"{model}.xml"))
     report = json.loads((folder / "report" / "report.json").read_text())
-    errors = []
+    errors, paths = [], []
     written = folder / "report" / "robot.xml"
     for path in (folder / f"{model}.xml", written if written.exists() else folder / f"{model}.xml"):
         m = load(path)
         rollout = simulate(m, controller, kept["command"])
+        paths.append(rollout.position)
         errors.append((inverse_rms(m, run), np.sqrt(np.mean((rollout.position - run.position)**2, 0))))
     said = [np.array(report[key]) for key in ("holdout_rms_before", "holdout_rms_after")]
     found = [f"{f['effect']}@{f['joint'] or f['link'] or 'tool'}" for f in report["findings"]]
     return {"case": name, "changes": changes, "found": found, "verdict": report["verdict"],
             "inverse": [e[0].tolist() for e in errors], "rollout": [e[1].tolist() for e in errors],
-            "said": [x.tolist() for x in said], "written": written.exists()}
+            "said": [x.tolist() for x in said], "written": written.exists(), "measured": run.position, "paths": paths}
 
 
 def table(results):
@@ -197,6 +198,29 @@ def table(results):
     return "\n".join(lines) + f"\n\nThe rollout's error falls to {np.median(ratios):.3f} of what it was in the median of {len(ratios)} cases."
 
 
+def picture(result, joint):
+    """An SVG of a joint's position: measured, and simulated as it was and as it was written."""
+    width, height, left, top = 720, 260, 56, 18
+    lines = [("measured", result["measured"], "#222", 3), ("simulated before", result["paths"][0], "#d1495b", 1.5),
+             ("simulated with the written model", result["paths"][1], "#3a86c8", 1.5)]
+    values = np.concatenate([path[:, joint] for _, path, _, _ in lines])
+    low, high = values.min(), values.max()
+    svg = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="12">',
+           f'<rect width="{width}" height="{height}" fill="#fff"/>']
+    for value in (low, (low + high) / 2, high):
+        y = top + (height - top - 48) * (high - value) / (high - low)
+        svg.append(f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{value:.2f}</text>'
+                   f'<line x1="{left}" x2="{width - 8}" y1="{y:.1f}" y2="{y:.1f}" stroke="#ddd"/>')
+    for k, (name, path, colour, stroke) in enumerate(lines):
+        y = top + (height - top - 48) * (high - path[::5, joint]) / (high - low)
+        x = left + (width - left - 8) * np.linspace(0, 1, len(y))
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y))
+        svg.append(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="{stroke}"/>'
+                   f'<text x="{left + 220 * k}" y="{height - 8}" fill="{colour}">{name}</text>')
+    svg.append(f'<text x="{left}" y="{height - 26}">time, 0 to {LENGTH_S:g} s; position [rad]</text></svg>')
+    return "\n".join(svg) + "\n"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("tauscope")
@@ -204,6 +228,7 @@ def main():
     parser.add_argument("--cases", default=",".join(CASES))
     parser.add_argument("--seed", type=int, default=11)
     parser.add_argument("--table", action="store_true", help="only print the table of what is there")
+    parser.add_argument("--svg", type=pathlib.Path, help="a picture of the first case's rollout, at the joint that was furthest off")
     args = parser.parse_args()
     results = []
     for name in args.cases.split(","):
@@ -215,6 +240,8 @@ def main():
                 explain(args.tauscope, folder, CASES[name][0])
         results.append(judge(folder, name))
     print(table(results))
+    if args.svg:
+        args.svg.write_text(picture(results[0], int(np.argmax(results[0]["rollout"][0]))))
 
 
 if __name__ == "__main__":
