@@ -9,7 +9,7 @@ use tauscope_session::robot;
 
 use crate::common::{Out, root, write};
 
-/// Dry friction at the shoulder beside that of the model, of none, and viscous friction at the elbow beside that of 0.5 \[N m, N m s/rad\].
+/// Additional dry friction at the shoulder \[N m\] and viscous friction at the elbow \[N m s/rad\].
 const MORE: [f64; 2] = [2.5, 1.25];
 
 /// Recordings of an arm that has more friction than its model says.
@@ -102,7 +102,7 @@ fn a_mujoco_model_and_recordings_make_a_corrected_model_in_one_command() {
     assert!((more - MORE[0]).abs() < 0.1, "{more} {}", done.stdout);
     let more = drive(&after, "elbow").damping - drive(&before, "elbow").damping;
     assert!((more - MORE[1]).abs() < 0.1, "{more} {}", done.stdout);
-    // What was not found stays as it was written.
+    // The other joint stays as it was written.
     assert_eq!(drive(&after, "roll"), drive(&before, "roll"));
     assert_eq!(drive(&after, "elbow").friction, 0.8);
     let text = std::fs::read_to_string(&path).unwrap();
@@ -111,7 +111,7 @@ fn a_mujoco_model_and_recordings_make_a_corrected_model_in_one_command() {
         "{text}"
     );
 
-    // The same corrections for others. An actuator configuration needs no file; a URDF that is a MuJoCo model is refused.
+    // Other simulators get the same corrections. An actuator configuration needs no file; a URDF that is a MuJoCo model is refused.
     let isaac = folder.path().join("isaac.py");
     let done = export(&report, "isaaclab", None, &isaac);
     assert_eq!(done.code, 0, "{}", done.stderr);

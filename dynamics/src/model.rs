@@ -59,7 +59,7 @@ pub struct Joint {
     pub axis: [f64; 3],
     /// Its limits as far as the URDF gives them.
     pub limits: Limits,
-    /// What the file says of its drive.
+    /// Friction, rotor and spring that the file states.
     pub drive: Drive,
 }
 

@@ -158,7 +158,7 @@ impl Source<JointState> for After {
     }
 }
 
-/// What `model` corrects in `cell`; without one, what the robot's file states beside the bodies.
+/// The correction of `model` for `cell`; without one, friction, rotors and springs of the robot's file.
 ///
 /// # Errors
 /// If the model does not fit the cell.

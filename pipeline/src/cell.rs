@@ -125,7 +125,7 @@ impl Cell {
         joints.map(|joint| joint.limits.effort).collect()
     }
 
-    /// Friction, rotors and springs that the robot's file states, where efforts in N m can be told in the measured unit.
+    /// Friction, rotors and springs that the robot's file states, if the measured unit is N m or torque constants are known.
     pub fn stated_terms(&self) -> Vec<TermSpec> {
         let facts = &self.facts;
         let is_told =

@@ -130,6 +130,12 @@ def test_a_result_that_was_lossy_says_so(data: Path, tmp_path: Path) -> None:
 def test_explain_finds_what_was_concealed(concealed: tauscope.Simulation, tmp_path: Path) -> None:
     result = tauscope.explain(concealed.case, out=tmp_path)
     assert result.verdict == "explained"
+    # The corrections in a simulator's own file, by its ending.
+    actuators = tmp_path / "actuators.py"
+    assert result.write_model(actuators)[-1] == f"wrote {actuators}"
+    assert actuators.read_text().startswith("# Corrected by tauscope.")
+    with pytest.raises(tauscope.InputError, match="names no simulator"):
+        result.write_model(tmp_path / "model.step")
     assert concealed.concealed is not None
     hidden = json.loads(concealed.concealed.read_text())
     assert result.findings[0]["effect"] in json.dumps(hidden)

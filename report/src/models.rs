@@ -32,7 +32,7 @@ pub enum ModelError {
     OtherKind {
         /// The outermost element.
         found: String,
-        /// What is to be written.
+        /// The target's name.
         target: &'static str,
         /// The outermost element that it needs.
         expected: &'static str,
@@ -62,9 +62,9 @@ pub enum ModelError {
 pub struct Written {
     /// Its text.
     pub text: String,
-    /// What was written, a line each.
+    /// Quantities that were written, a line each.
     pub written: Vec<String>,
-    /// What was approximated or left out, and why, a line each.
+    /// Effects that were approximated or left out, with the reason, a line each.
     pub lost: Vec<String>,
 }
 

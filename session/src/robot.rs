@@ -119,7 +119,7 @@ fn is_mjcf(text: &str) -> bool {
     matches!(found, Some(ModelError::NotARobot { found, .. }) if found == MJCF_ROOT)
 }
 
-/// What is to be said of the drives that the file states.
+/// Sentences about friction, rotors and springs in the file.
 fn of_drives(urdf: &str, model: &Model) -> Vec<String> {
     let mut said = Vec::new();
     let joints = model.joints().iter();
@@ -128,7 +128,7 @@ fn of_drives(urdf: &str, model: &Model) -> Vec<String> {
         .count();
     if stated > 0 {
         said.push(format!(
-            "it states friction, rotors or springs of {stated} joints. They are part of the twin, and findings are what is missing beside them"
+            "it states friction, rotors or springs of {stated} joints. They are part of the twin, and findings add to them"
         ));
     }
     let size = |node: &roxmltree::Node<'_, '_>| {

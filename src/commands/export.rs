@@ -20,7 +20,7 @@ use crate::output::Output;
 pub struct Args {
     /// The folder that `explain` wrote.
     report: PathBuf,
-    /// What to write.
+    /// The simulator whose file is written.
     #[arg(long, value_name = "SIMULATOR", value_parser = target)]
     to: Target,
     /// The model that is corrected: everything else in it stays as it is. By default the robot that was explained.
@@ -104,7 +104,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Where the robot of a report lies, as far as it says.
+/// Path of the robot that a report explains, if the report has it.
 fn robot_of(twin: &TwinFile) -> Option<PathBuf> {
     twin.provenance.get("robot").map(PathBuf::from)
 }

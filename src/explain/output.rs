@@ -222,7 +222,7 @@ fn twin_text(
 }
 
 /// A corrected robot in the format of its file, and whether it is the whole corrected twin: a URDF where all of it is bodies, a
-/// MuJoCo model where any of it can be said there.
+/// MuJoCo model if it has an element for any of it.
 fn robot_text(
     request: &Request,
     kept: &Kept,

@@ -106,7 +106,7 @@ pub fn read(request: &Request, progress: &dyn Fn(f64, &str)) -> Result<Input, Re
     })
 }
 
-/// What the robot's file states beside its bodies.
+/// Friction, rotors and springs in the robot's file.
 fn of_robot(request: &Request) -> Option<Start> {
     let terms = request.cell.stated_terms();
     let joints = request.cell.facts.joint_names.len();

@@ -17,6 +17,7 @@ import json
 import pathlib
 import shutil
 import subprocess
+import time
 
 import mujoco
 import numpy as np
@@ -149,7 +150,9 @@ def explain(program, folder, model):
     fit = [str(folder / f"rec_{k}.csv") for k in range(RECORDINGS) if k != HELD_OUT]
     command = [program, "explain", "--fit", *fit, "--holdout", str(folder / f"rec_{HELD_OUT}.csv"), "--robot",
                str(folder / f"{model}.xml"), "--out", str(folder / "report"), "--force"]
+    begin = time.time()
     subprocess.run(command, check=True, capture_output=True, text=True)
+    (folder / "seconds.json").write_text(json.dumps(time.time() - begin))
 
 
 def inverse_rms(m, run):

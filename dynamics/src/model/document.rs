@@ -5,13 +5,11 @@
 //! first.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 use roxmltree::{Document, Error, Node, ParsingOptions};
 
 use super::ModelError;
-use super::drive::{Drive, drives};
 
 /// Longest text \[bytes\].
 /// Resolution: bounds memory and time.
@@ -41,7 +39,6 @@ pub(super) struct JointMarks {
     pub upper: bool,
     pub velocity: bool,
     pub effort: bool,
-    pub drive: Drive,
 }
 
 /// Looks the XML over.
@@ -63,13 +60,10 @@ pub(super) fn inspect(xml: &str) -> Result<Marks, ModelError> {
     for part in elements(root).filter(|node| is_any(*node, &["link", "joint"])) {
         check_numbers(part)?;
     }
-    let drives = drives(&document);
     let named = |name| elements(root).filter(move |node| node.has_tag_name(name));
     Ok(Marks {
         link_lines: named("link").map(line).collect(),
-        joints: named("joint")
-            .map(|joint| joint_marks(joint, &drives))
-            .collect(),
+        joints: named("joint").map(joint_marks).collect(),
     })
 }
 
@@ -303,7 +297,7 @@ fn describe(node: Node, part: Node) -> String {
     )
 }
 
-fn joint_marks(joint: Node, drives: &BTreeMap<String, Drive>) -> JointMarks {
+fn joint_marks(joint: Node) -> JointMarks {
     let limit = elements(joint).find(|node| node.has_tag_name("limit"));
     let given = |name| limit.is_some_and(|limit| limit.has_attribute(name));
     JointMarks {
@@ -312,11 +306,6 @@ fn joint_marks(joint: Node, drives: &BTreeMap<String, Drive>) -> JointMarks {
         upper: given("upper"),
         velocity: given("velocity"),
         effort: given("effort"),
-        drive: joint
-            .attribute("name")
-            .and_then(|name| drives.get(name))
-            .copied()
-            .unwrap_or_default(),
     }
 }
 

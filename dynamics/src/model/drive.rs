@@ -1,4 +1,4 @@
-//! What a robot file says of joints' drives, beside the bodies.
+//! Friction, rotors and springs of joints in a robot file.
 
 use std::collections::BTreeMap;
 
@@ -11,8 +11,8 @@ pub const MUJOCO: &str = "http://www.mujoco.org";
 /// Namespace of Drake's elements.
 const DRAKE: &str = "http://drake.mit.edu";
 
-/// What a robot file says of a joint's drive; zero where it says nothing. A URDF's `<dynamics>` is no part of it: exporters
-/// write placeholders there.
+/// Friction, rotor and spring of a joint; zero where the file has none. A URDF's `<dynamics>` does not count: exporters write
+/// placeholders there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Drive {
     /// Viscous friction \[N m s/rad or N s/m\].
@@ -23,7 +23,7 @@ pub struct Drive {
     pub rotor_inertia: f64,
     /// Stiffness of a spring \[N m/rad or N/m\].
     pub stiffness: f64,
-    /// Where the spring is at rest \[rad or m\].
+    /// Position at which the spring has no force \[rad or m\].
     pub rest: f64,
 }
 
@@ -67,4 +67,35 @@ pub(super) fn drives(document: &Document<'_>) -> BTreeMap<String, Drive> {
 fn number(text: Option<&str>) -> f64 {
     let number = text.and_then(|text| text.trim().parse::<f64>().ok());
     number.filter(|x| x.is_finite()).unwrap_or(0.0)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rotors_of_drake_are_seen_through_the_gear_and_dynamics_do_not_count() {
+        let urdf = r#"<robot name="one" xmlns:drake="http://drake.mit.edu">
+          <joint name="turn" type="continuous"><dynamics damping="1" friction="1"/></joint>
+          <transmission name="drive">
+            <joint name="turn"/>
+            <actuator name="motor"><drake:rotor_inertia value="2e-5"/><drake:gear_ratio value="100"/></actuator>
+          </transmission>
+        </robot>"#;
+        let document = Document::parse(urdf).unwrap();
+        let expected = Drive {
+            rotor_inertia: 0.2,
+            ..Drive::default()
+        };
+        let found = drives(&document)["turn"];
+        assert!((found.rotor_inertia - expected.rotor_inertia).abs() < 1e-12);
+        assert_eq!(
+            Drive {
+                rotor_inertia: 0.2,
+                ..found
+            },
+            expected
+        );
+    }
 }

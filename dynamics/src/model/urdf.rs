@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Vector3};
 
 use super::document::{self, JointMarks};
+use super::drive::drives;
 use super::{Drive, Geometry, JointKind, Limits, ModelError, Shape};
 use crate::inertia::Inertia;
 use crate::inertia::symmetric;
@@ -141,6 +142,7 @@ pub(super) fn read(xml: &str) -> Result<Robot, ModelError> {
         }
         links.push(read_link(link, line)?);
     }
+    let drives = drives(&document::parse(xml)?);
     let mut seen: BTreeMap<String, u32> = BTreeMap::new();
     let mut joints = Vec::with_capacity(robot.joints.len());
     for (joint, marks) in robot.joints.into_iter().zip(&marks.joints) {
@@ -152,7 +154,8 @@ pub(super) fn read(xml: &str) -> Result<Robot, ModelError> {
                 line,
             });
         }
-        joints.push(read_joint(joint, marks, &indices)?);
+        let drive = drives.get(&joint.name).copied().unwrap_or_default();
+        joints.push(read_joint(joint, marks, drive, &indices)?);
     }
     Ok(Robot {
         name: robot.name,
@@ -193,6 +196,7 @@ fn read_link(link: urdf_rs::Link, line: u32) -> Result<RawLink, ModelError> {
 fn read_joint(
     joint: urdf_rs::Joint,
     marks: &JointMarks,
+    drive: Drive,
     links: &BTreeMap<String, usize>,
 ) -> Result<RawJoint, ModelError> {
     let (name, line) = (joint.name, marks.line);
@@ -234,7 +238,7 @@ fn read_joint(
                 kind,
                 axis,
                 limits: limits(kind, &joint.limit, marks),
-                drive: marks.drive,
+                drive,
                 follows: joint.mimic.map(|mimic| Follows {
                     joint: mimic.joint,
                     ratio: mimic.multiplier.unwrap_or(1.0),

@@ -1,4 +1,4 @@
-//! The terms that a robot file states beside the bodies.
+//! Terms of the friction, rotors and springs in a robot file.
 
 use std::collections::BTreeMap;
 

@@ -41,7 +41,7 @@ pub struct Effect {
     pub simpler: Option<Simpler>,
     /// The motion that shows it.
     pub excitation: Excitation,
-    /// How a simulator's model says it.
+    /// Its form in a simulator's model.
     pub exported: Exported,
     /// How a simulated arm suffers it.
     pub simulated: Simulated,

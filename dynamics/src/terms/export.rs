@@ -1,8 +1,8 @@
-//! What a simulator can hold of an effect.
+//! Effects in simulators' models.
 
 use super::{Effect, TermSpec};
 
-/// What a simulator's model has beside its bodies' geometry. Signs are those of the joint's axis.
+/// A quantity of a simulator's model. Signs are those of the joint's axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Quantity {
     /// Viscous friction \[N m s/rad or N s/m\].
@@ -17,10 +17,10 @@ pub enum Quantity {
     Spring {
         /// \[N m/rad or N/m\]
         stiffness: f64,
-        /// Where it is at rest \[rad or m\].
+        /// Position without force \[rad or m\].
         rest: f64,
     },
-    /// What the joint's zero is off by \[rad or m\]: where it reads q, the joint is at q + this.
+    /// Error of the joint's zero \[rad or m\]: where the encoder reads q, the joint is at q + this.
     Zero(f64),
     /// A body's mass, centre of mass and inertia ([`super::Term::inertia`]).
     Body,
@@ -28,7 +28,7 @@ pub enum Quantity {
     Gravity,
 }
 
-/// How a simulator's model says an effect.
+/// The form of an effect in a simulator's model.
 #[derive(Debug, Clone, Copy)]
 pub enum Exported {
     /// By these quantities, from its parameters.

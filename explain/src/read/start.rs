@@ -1,4 +1,4 @@
-//! What an explanation starts from beside the rigid bodies: a corrected twin, or what the robot's file states.
+//! Physics that an explanation starts from: a corrected twin, or friction, rotors and springs in the robot's file.
 
 use tauscope_dynamics::terms::{Against, TermSpec};
 
@@ -6,7 +6,7 @@ use tauscope_dynamics::terms::{Against, TermSpec};
 /// Statistical: its 95 % interval is then no wider than ±1.96 / 5 = ±39 %.
 pub const KNOWN: f64 = 5.0;
 
-/// A twin's physics beside the rigid bodies.
+/// Physics of a twin in addition to rigid bodies.
 #[derive(Debug, Clone, Default)]
 pub struct Start {
     /// Whether it was found on this arm before. Else the robot's file states it.

@@ -1,4 +1,4 @@
-//! What the terms of a twin ask of a model.
+//! Quantities that the terms of a twin change in a robot's model.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ const LEAST_GRAVITY_M_S2: f64 = 1e-6;
 /// Numbers that differ by less, as a share, are the same. Resolution: of nine digits.
 const SAME: f64 = 1e-9;
 
-/// What is to be in the model of a joint; `None` where it stays as it is.
+/// New values of a joint's quantities; `None` where the old one stays.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct JointCorrections {
     /// Viscous friction \[N m s/rad or N s/m\].
@@ -25,11 +25,11 @@ pub struct JointCorrections {
     pub armature: Option<f64>,
     /// Stiffness of a spring and where it is at rest \[N m/rad, rad; or N/m, m\].
     pub spring: Option<[f64; 2]>,
-    /// What the zero is off by \[rad or m\].
+    /// Error of the zero \[rad or m\].
     pub zero: Option<f64>,
 }
 
-/// What is to be in a robot's model.
+/// New values in a robot's model.
 #[derive(Debug, Clone, Default)]
 pub struct Corrections {
     /// By joint.
@@ -45,7 +45,7 @@ pub struct Corrections {
 }
 
 impl Corrections {
-    /// What these terms ask of the model of a robot. Terms of the same kind add up. Of bodies, those that `findings` name
+    /// The changes that these terms make in the model of a robot. Terms of the same kind add up. Of bodies, those that `findings` name
     /// count: a twin also has the usual errors of all others, which are no correction.
     pub fn of(model: &Model, terms: &[TermSpec], findings: &[Finding]) -> Self {
         let mut all = Self::default();

@@ -17,10 +17,10 @@ pub fn configuration(corrections: &Corrections) -> String {
         // At rest friction is at least that in motion.
         let at_rest = at_rest.map(|x| x.max(own.friction.unwrap_or(0.0)));
         let values = [
-            ("armature", own.armature),
-            ("friction", at_rest),
-            ("dynamic_friction", own.friction),
-            ("viscous_friction", own.damping),
+            ("armature=", own.armature),
+            ("friction=", at_rest),
+            ("dynamic_friction=", own.friction),
+            ("viscous_friction=", own.damping),
         ];
         if values.iter().all(|(_, value)| value.is_none()) {
             continue;
@@ -31,7 +31,7 @@ pub fn configuration(corrections: &Corrections) -> String {
         );
         for (name, value) in values {
             if let Some(value) = value {
-                let _ = writeln!(text, "        {name}={},", digits(value));
+                let _ = writeln!(text, "        {name}{},", digits(value));
             }
         }
         text.push_str("    ),\n");

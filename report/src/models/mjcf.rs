@@ -11,7 +11,7 @@ use super::edits::{Edits, child, digits};
 use super::urdf::{parse, refuse_no_body};
 use super::{ModelError, Target};
 
-/// Attributes of `<inertial>` that stand beside mass and position.
+/// Attributes of `<inertial>` that give the moments of inertia and their axes.
 const OF_INERTIA: [&str; 7] = [
     "diaginertia",
     "fullinertia",

@@ -6,7 +6,7 @@ use tauscope_dynamics::terms::{EFFECTS, Exported, Quantity, effect};
 
 use super::target::{Place, TARGETS};
 
-/// What each simulator has, and what becomes of each effect, as Markdown.
+/// The elements of each simulator for each quantity, and the quantities of each effect, as Markdown.
 pub fn table() -> String {
     let mut text = String::from("| | ");
     let names = TARGETS.map(|target| format!("`{}`", target.name()));

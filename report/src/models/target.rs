@@ -1,4 +1,4 @@
-//! What the simulators have, and by which element.
+//! Elements of simulators' files for each quantity.
 
 use std::fmt::Write as _;
 
@@ -80,7 +80,7 @@ impl Target {
         }
     }
 
-    /// Where it has each quantity, with the quantity's name.
+    /// The element of each quantity, with the quantity's name.
     pub fn places(self) -> [(&'static str, Place); 8] {
         let of_urdf =
             "not read by URDF's simulators; MuJoCo's armature or Drake's rotor_inertia is";
@@ -126,7 +126,7 @@ impl Target {
                 At("`dynamic_friction` of the actuator [N m]"),
                 At("`friction` of the actuator [N m]"),
                 At("`armature` of the actuator [kg m²]"),
-                Lacks("an actuator has no spring beside its controller's"),
+                Lacks("an actuator has no spring but its controller's"),
                 Lacks("correct the URDF that the asset is made from: --to urdf"),
                 Lacks("correct the URDF that the asset is made from: --to urdf"),
                 Lacks("set `gravity` of the simulation's configuration by hand"),
@@ -145,7 +145,7 @@ impl Target {
         std::array::from_fn(|k| (QUANTITIES[k], places[k]))
     }
 
-    /// What of the corrections it writes, and what it has no place for.
+    /// The corrections that it writes, and those that it has no element for, a line each.
     pub fn said(self, corrections: &Corrections) -> (Vec<String>, Vec<String>) {
         let (mut written, mut lost) = (Vec::new(), Vec::new());
         let places = self.places();

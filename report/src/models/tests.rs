@@ -127,7 +127,7 @@ fn bodies_are_what_the_terms_say_in_every_format() {
             .contains("<!-- kept -->\n<robot name=\"two\">\n  <link name=\"base\"/>")
     );
     let new = Model::from_urdf(&urdf.text).unwrap();
-    // What the robot feels is what the terms say.
+    // The effort is that of the terms.
     let mut altered = Model::from_urdf(ROBOT).unwrap();
     let terms: Vec<TermSpec> = serde_json::from_str(OF_BODIES).unwrap();
     for term in &terms {

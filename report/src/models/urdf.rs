@@ -153,15 +153,18 @@ fn drives(document: &Document<'_>, corrections: &Corrections, edits: &mut Edits<
         let inertia = format!("<drake:rotor_inertia value=\"{value}\"/>");
         let ratio = "<drake:gear_ratio value=\"1\"/>";
         if let Some(actuator) = own.next().and_then(|node| child(node, "actuator")) {
-            let old = |name| {
+            let old = |prefixed: &str| {
+                let name = prefixed.trim_start_matches("drake:");
                 actuator
                     .children()
                     .find(|node| node.has_tag_name((DRAKE, name)))
             };
-            for (old, new) in [
-                (old("rotor_inertia"), inertia.as_str()),
-                (old("gear_ratio"), ratio),
-            ] {
+            let elements = [
+                ("drake:rotor_inertia", inertia.as_str()),
+                ("drake:gear_ratio", ratio),
+            ];
+            for (name, new) in elements {
+                let old = old(name);
                 match old {
                     Some(old) => edits.replace(old.range(), new.to_owned()),
                     None => edits.insert(actuator, new),

@@ -7,6 +7,7 @@
 
 mod bodies;
 mod includes;
+mod names;
 mod text;
 
 use std::collections::BTreeMap;
@@ -22,6 +23,7 @@ use tauscope_dynamics::MUJOCO;
 
 use bodies::{NoInertia, inertia, shapes};
 use includes::with_includes;
+use names::Names;
 use text::{escaped, isometry, origin};
 
 /// Gravity that every twin computes with \[m/s²\]. Physical: simulators use 9.81 instead of the standard 9.80665.
@@ -49,7 +51,7 @@ pub enum MjcfError {
         file: PathBuf,
         /// The file that includes it.
         within: String,
-        /// What is wrong.
+        /// The reason.
         reason: String,
     },
     /// Nothing but a free body moves.
@@ -73,7 +75,7 @@ pub enum MjcfError {
     Compiler(&'static str),
 }
 
-/// How a compiled model is saved.
+/// The command that saves a compiled model.
 const SAVE: &str = "python3 -c \"import mujoco; m = mujoco.MjModel.from_xml_path('MODEL.xml'); mujoco.mj_saveLastXML('SAVED.xml', m)\"";
 
 /// The URDF of the model in `xml`, whose file is at `path`, and remarks on what a URDF cannot say.
@@ -116,34 +118,6 @@ fn folder_of(path: &Path) -> &Path {
 /// If one of them cannot be read.
 pub fn whole(xml: &str, path: &Path) -> Result<String, MjcfError> {
     with_includes(xml, folder_of(path), &[path.to_path_buf()])
-}
-
-/// Names of all bodies and joints, which MuJoCo allows to be missing.
-struct Names {
-    bodies: Vec<String>,
-    joints: BTreeMap<(BodyId, usize), String>,
-}
-
-impl Names {
-    fn of(model: &Model) -> Self {
-        let body = |(id, entry): (BodyId, &mjcf_rs::BodyEntry)| match (&entry.body.name, id) {
-            (_, 0) => WORLD.to_owned(),
-            (Some(name), _) => name.clone(),
-            (None, id) => format!("body_{id}"),
-        };
-        let mut joints = BTreeMap::new();
-        for (id, entry) in model.bodies_iter() {
-            for (k, joint) in entry.body.joints.iter().enumerate() {
-                let own = joint.name.clone();
-                let name = own.unwrap_or_else(|| format!("joint_{}", joints.len()));
-                joints.insert((id, k), name);
-            }
-        }
-        Self {
-            bodies: model.bodies.iter().enumerate().map(body).collect(),
-            joints,
-        }
-    }
 }
 
 struct Writer<'a> {
@@ -209,7 +183,7 @@ impl Writer<'_> {
                 "the model's gravity is {size} m/s²; the twin computes with {GRAVITY_M_S2} m/s², because a real arm has weight"
             ));
         }
-        // Where gravity points up, every turn by half a circle about a level axis will do.
+        // If gravity points up, any half turn about a level axis points it down.
         let half = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         let turn = UnitQuaternion::rotation_between(&gravity, &-Vector3::z()).unwrap_or(half);
         if size == 0.0 || turn.angle() < LEAST_TURN_RAD {
@@ -302,7 +276,7 @@ impl Writer<'_> {
         Ok(())
     }
 
-    /// The URDF type of a joint, and its elements beside origin, parent and child.
+    /// The URDF type of a joint, and its elements apart from origin, parent and child.
     fn moving(&self, joint: &Joint, name: &str, axis: Vector3<f64>) -> (&'static str, String) {
         let mut rest = format!("    <axis xyz=\"{} {} {}\"/>\n", axis.x, axis.y, axis.z);
         let autolimits = self.model.compiler.autolimits;
