@@ -34,7 +34,10 @@ fn completed(script: &str, typed: &str) -> Vec<String> {
 fn bash_completes_commands_and_options() {
     let script = Out::answer(["completions", "bash"]);
     assert_eq!(script.code, 0, "{script:?}");
-    assert_eq!(completed(&script.stdout, "tauscope exp"), ["explain"]);
+    assert_eq!(
+        completed(&script.stdout, "tauscope exp"),
+        ["explain", "export"]
+    );
     assert_eq!(
         completed(&script.stdout, "tauscope explain --hold"),
         ["--holdout"]

@@ -103,7 +103,9 @@ fn named_parts<'a, 'i>(
 fn angles_in_degrees(document: &Document<'_>) -> bool {
     let all = document.root_element().children();
     let compilers = all.filter(|node| node.has_tag_name("compiler"));
-    let angle = compilers.filter_map(|node| node.attribute("angle")).last();
+    let angle = compilers
+        .filter_map(|node| node.attribute("angle"))
+        .next_back();
     angle != Some("radian")
 }
 

@@ -11,9 +11,9 @@ use super::corrections::Corrections;
 pub enum Target {
     /// URDF, as Isaac Sim, Gazebo, Pinocchio and others read it.
     Urdf,
-    /// MuJoCo's MJCF.
+    /// `MuJoCo`'s MJCF.
     Mjcf,
-    /// SDFormat, as Gazebo reads it.
+    /// `SDFormat`, as Gazebo reads it.
     Sdf,
     /// An actuator configuration of Isaac Lab.
     IsaacLab,
@@ -174,7 +174,7 @@ impl Target {
             let before = corrections
                 .before
                 .get(link)
-                .map_or(0.0, |body| body.mass_kg());
+                .map_or(0.0, tauscope_dynamics::Inertia::mass_kg);
             let mass = number(body.mass_kg());
             say(
                 6,

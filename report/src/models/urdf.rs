@@ -30,15 +30,12 @@ pub fn corrected(
             kind: "link",
             name: link.clone(),
         })?;
-        match child(node, "inertial") {
-            Some(old) => {
-                let text = inertial(body, &indent_of(urdf, old.range().start));
-                edits.replace(old.range(), text);
-            }
-            None => {
-                let inner = format!("{}  ", indent_of(urdf, node.range().start));
-                edits.insert(node, &inertial(body, &inner));
-            }
+        if let Some(old) = child(node, "inertial") {
+            let text = inertial(body, &indent_of(urdf, old.range().start));
+            edits.replace(old.range(), text);
+        } else {
+            let inner = format!("{}  ", indent_of(urdf, node.range().start));
+            edits.insert(node, &inertial(body, &inner));
         }
     }
     for (joint, own) in &corrections.joints {
