@@ -1,5 +1,7 @@
 //! MuJoCo models as robots: efforts are those that MuJoCo computes (`tests/simulators/reference.py`).
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 use std::path::PathBuf;
 
 use tauscope_dynamics::{Data, Model, rnea};
