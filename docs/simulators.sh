@@ -8,5 +8,5 @@ cd "$(dirname "$0")/.."
 tables=$(mktemp)
 trap 'rm -f "$tables"' EXIT
 cargo run --quiet --locked -p tauscope-report --example simulators >"$tables"
-sed -i '/^## What simulators can say$/q' docs/simulators.md
+sed -i '/^## Elements by simulator$/q' docs/simulators.md
 { echo; cat "$tables"; } >>docs/simulators.md

@@ -105,7 +105,7 @@ fn the_page_of_simulators_has_the_tables_of_the_effects() {
     let path = root().join("docs/simulators.md");
     let page = std::fs::read_to_string(&path).unwrap();
     let tables = tauscope_report::models::table();
-    let (_, found) = page.split_once("## What simulators can say\n\n").unwrap();
+    let (_, found) = page.split_once("## Elements by simulator\n\n").unwrap();
     assert!(
         found == tables,
         "docs/simulators.md is behind the effects; its last section is to be:\n{tables}"

@@ -196,7 +196,7 @@ fn of_twin(
     }
     let other = |spec: &&TermSpec| {
         let effect = spec.effect().ok();
-        effect.is_some_and(|effect| effect.traits.is_followed && !effect.is_plain_friction())
+        effect.is_some_and(|effect| effect.traits.is_followed && !effect.may_be_overstated())
     };
     for spec in start.terms.iter().filter(other) {
         let Ok(effect) = spec.effect() else { continue };

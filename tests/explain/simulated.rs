@@ -96,7 +96,7 @@ fn a_wall_and_something_carried_for_a_while_are_both_told_within_their_intervals
         for (name, truth) in shown {
             let [low, high] =
                 [0, 1].map(|end| finding["intervals_95"][name][end].as_f64().unwrap());
-            // Of so many 95 % intervals one may miss; of three standard deviations, none.
+            // Eight 95 % intervals miss once in three draws; three standard deviations miss once in fifty.
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * 3.0 / 1.96);
             assert!(
                 (truth - middle).abs() <= half,

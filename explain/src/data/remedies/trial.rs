@@ -164,7 +164,11 @@ impl<'a> Trial<'a> {
 
     /// Whether the twin has friction of the joint already: there may be less of it.
     fn is_known(&self, joint: usize) -> bool {
-        !self.problem.known_friction[joint].is_empty()
+        let mut known = self.problem.known_friction[joint].keys();
+        known.any(|name| {
+            tauscope_dynamics::terms::effect(name)
+                .is_some_and(tauscope_dynamics::terms::Effect::is_plain_friction)
+        })
     }
 
     /// What a gain within its limits and friction that takes power leave. What is known of the friction may be too much.
