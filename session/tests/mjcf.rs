@@ -134,3 +134,11 @@ fn a_body_that_stands_upright_keeps_its_rotation() {
     assert!((effort(&near) - effort(&upright)).abs() < 1e-3);
     assert!(effort(&upright).abs() > 0.1);
 }
+
+#[test]
+fn a_mesh_that_stands_still_needs_no_mass() {
+    let text = r#"<mujoco><asset><mesh name="base" file="base.stl"/></asset><worldbody><body name="stand">
+        <geom type="mesh" mesh="base"/><body name="arm"><joint name="turn" axis="0 1 0"/>
+        <inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></body></worldbody></mujoco>"#;
+    assert_eq!(read(text).unwrap().model.dof(), 1);
+}

@@ -22,7 +22,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use tauscope_dynamics::MUJOCO;
 
 use bodies::{NoInertia, inertia, shapes};
-use includes::with_includes;
+use includes::folder_of;
+pub use includes::whole;
 use names::Names;
 use text::{escaped, isometry, origin};
 
@@ -106,18 +107,6 @@ pub fn to_urdf(xml: &str, path: &Path) -> Result<(String, Vec<String>), MjcfErro
     };
     writer.robot()?;
     Ok((writer.text, writer.remarks))
-}
-
-fn folder_of(path: &Path) -> &Path {
-    path.parent().unwrap_or(Path::new("."))
-}
-
-/// The model in `xml`, whose file is at `path`, with the files that it includes.
-///
-/// # Errors
-/// If one of them cannot be read.
-pub fn whole(xml: &str, path: &Path) -> Result<String, MjcfError> {
-    with_includes(xml, folder_of(path), &[path.to_path_buf()])
 }
 
 struct Writer<'a> {
@@ -241,7 +230,12 @@ impl Writer<'_> {
         }
         self.anchors.insert(id, at);
         let (mass, visual) = (
-            inertia(self.model, body, &name)?,
+            // A mesh that stands still needs no mass.
+            if self.is_moved(id) {
+                inertia(self.model, body, &name)?
+            } else {
+                None
+            },
             shapes(self.model, self.folder, body, &at),
         );
         let from = at.translation;
@@ -274,6 +268,13 @@ impl Writer<'_> {
             ));
         }
         Ok(())
+    }
+
+    /// Whether a joint moves a body.
+    fn is_moved(&self, id: BodyId) -> bool {
+        let entry = &self.model.bodies[id];
+        let parent = entry.parent.filter(|parent| *parent != id);
+        !entry.body.joints.is_empty() || parent.is_some_and(|parent| self.is_moved(parent))
     }
 
     /// The URDF type of a joint, and its elements apart from origin, parent and child.

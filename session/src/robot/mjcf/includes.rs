@@ -4,9 +4,22 @@ use std::path::{Path, PathBuf};
 
 use super::MjcfError;
 
+/// The folder that paths in a model begin at.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().unwrap_or(Path::new("."))
+}
+
+/// The model in `xml`, whose file is at `path`, with the files that it includes.
+///
+/// # Errors
+/// If one of them cannot be read.
+pub fn whole(xml: &str, path: &Path) -> Result<String, MjcfError> {
+    with_includes(xml, folder_of(path), &[path.to_path_buf()])
+}
+
 /// The text with each `<include>` replaced by the content of its file, as MuJoCo does it. The parser knows includes only between
 /// sections, not within a body. `open` are the files that it stands in, the innermost last.
-pub fn with_includes(xml: &str, folder: &Path, open: &[PathBuf]) -> Result<String, MjcfError> {
+fn with_includes(xml: &str, folder: &Path, open: &[PathBuf]) -> Result<String, MjcfError> {
     let document = roxmltree::Document::parse(xml);
     let document = document.map_err(|error| {
         let inner = open.last().cloned().unwrap_or_default();
