@@ -19,7 +19,7 @@ use mjcf_rs::equality::Equality;
 use mjcf_rs::extras::ActuatorKind;
 use mjcf_rs::{BodyId, Model, ParseError};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use tauscope_dynamics::MUJOCO;
+use tauscope_dynamics::{Inertia, MUJOCO};
 
 use bodies::{NoInertia, inertia, shapes};
 use includes::folder_of;
@@ -229,15 +229,8 @@ impl Writer<'_> {
             above = below;
         }
         self.anchors.insert(id, at);
-        let (mass, visual) = (
-            // A mesh that stands still needs no mass.
-            if self.is_moved(id) {
-                inertia(self.model, body, &name)?
-            } else {
-                None
-            },
-            shapes(self.model, self.folder, body, &at),
-        );
+        let mass = self.mass(id, body, &name)?;
+        let visual = shapes(self.model, self.folder, body, &at);
         let from = at.translation;
         let _ = writeln!(
             self.text,
@@ -268,6 +261,15 @@ impl Writer<'_> {
             ));
         }
         Ok(())
+    }
+
+    /// The inertia of a body; `None` where it stands still: a mesh there needs no mass.
+    fn mass(&self, id: BodyId, body: &Body, name: &str) -> Result<Option<Inertia>, NoInertia> {
+        if self.is_moved(id) {
+            inertia(self.model, body, name)
+        } else {
+            Ok(None)
+        }
     }
 
     /// Whether a joint moves a body.
