@@ -111,7 +111,7 @@ fn a_mujoco_model_and_recordings_make_a_corrected_model_in_one_command() {
         "{text}"
     );
 
-    // Other simulators get the same corrections. An actuator configuration needs no file; a URDF that is a MuJoCo model is refused.
+    // Other simulators get the same corrections. An actuator configuration needs no file.
     let isaac = folder.path().join("isaac.py");
     let done = export(&report, "isaaclab", None, &isaac);
     assert_eq!(done.code, 0, "{}", done.stderr);
@@ -120,9 +120,39 @@ fn a_mujoco_model_and_recordings_make_a_corrected_model_in_one_command() {
         text.contains("\"shoulder\": ImplicitActuatorCfg("),
         "{text}"
     );
-    let done = export(&report, "urdf", None, &folder.path().join("robot.urdf"));
-    assert_eq!(done.code, 2, "{}", done.stdout);
-    assert!(done.stderr.contains("--model FILE"), "{}", done.stderr);
+    // In a URDF of the model the whole friction is written, for nothing of it was stated there.
+    let urdf = folder.path().join("robot.urdf");
+    let done = export(&report, "urdf", None, &urdf);
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let text = std::fs::read_to_string(&urdf).unwrap();
+    let number = |joint: &str, attribute: &str| {
+        let document = roxmltree::Document::parse(&text).unwrap();
+        let mut all = document.descendants();
+        let node =
+            all.find(|node| node.has_tag_name("joint") && node.attribute("name") == Some(joint));
+        let mut children = node.unwrap().children();
+        let dynamics = children.find(|node| node.has_tag_name("dynamics")).unwrap();
+        dynamics
+            .attribute(attribute)
+            .unwrap()
+            .parse::<f64>()
+            .unwrap()
+    };
+    for (joint, drive) in after
+        .joints()
+        .iter()
+        .map(|joint| (&joint.name, joint.drive))
+    {
+        assert!(
+            (number(joint, "friction") - drive.friction).abs() < 1e-9,
+            "{joint}: {text}"
+        );
+        assert!(
+            (number(joint, "damping") - drive.damping).abs() < 1e-9,
+            "{joint}: {text}"
+        );
+    }
+    assert!(!text.contains("mujoco"), "{text}");
     let done = export(&report, "mjcf", None, &model);
     assert_eq!(done.code, 2, "the input would be lost: {}", done.stdout);
     let done = export(&report, "gazebo", None, &isaac);

@@ -114,6 +114,16 @@ pub fn source(path: &Path) -> Result<Source, UrdfError> {
     }
 }
 
+/// The URDF of a MuJoCo model without the elements of MuJoCo's namespace, for readers of URDF.
+///
+/// # Errors
+/// If what is left is no robot.
+pub fn plain_urdf(urdf: &str) -> Result<(String, Model), ModelError> {
+    let text = mjcf::without_mujoco(urdf);
+    let model = Model::from_urdf(&text)?;
+    Ok((text, model))
+}
+
 fn is_mjcf(text: &str) -> bool {
     let found = Model::from_urdf(text).err();
     matches!(found, Some(ModelError::NotARobot { found, .. }) if found == MJCF_ROOT)

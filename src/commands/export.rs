@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use tauscope_archive::whole_file::{self, Existing};
+use tauscope_dynamics::Model;
 use tauscope_explain::report::Report;
 use tauscope_pipeline::report::Problem;
 use tauscope_report::models::{self, Corrections, TARGETS, Target};
@@ -23,7 +24,8 @@ pub struct Args {
     /// The simulator whose file is written.
     #[arg(long, value_name = "SIMULATOR", value_parser = target)]
     to: Target,
-    /// The model that is corrected: everything else in it stays as it is. By default the robot that was explained.
+    /// The model that is corrected: everything else in it stays as it is. By default the robot that was explained; for `urdf` and `drake`
+    /// a MuJoCo model is made a URDF.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// The new file.
@@ -78,8 +80,8 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let robot = robot::read(robot_path).map_err(|error| {
         Failure::Rejected(Problem::of_file(robot_path, error.to_string()).into())
     })?;
-    let source = source(args, robot_path, &robot)?;
-    let corrections = Corrections::of(&robot.model, &twin.terms, &report.findings);
+    let (source, model) = source(args, robot_path, &robot)?;
+    let corrections = Corrections::of(&model, &twin.terms, &report.findings);
     let written = models::write(args.to, &source, &robot.urdf, &corrections)
         .map_err(|error| Failure::rejected(error.to_string()))?;
     whole_file::write(&args.out, written.text.as_bytes(), Existing::Replace).map_err(|error| {
@@ -109,10 +111,13 @@ fn robot_of(twin: &TwinFile) -> Option<PathBuf> {
     twin.provenance.get("robot").map(PathBuf::from)
 }
 
-/// The text that is corrected.
-fn source(args: &Args, robot_path: &Path, robot: &Robot) -> Result<String, Failure> {
+/// The text that is corrected, and the robot with what that text states of its drives.
+fn source(args: &Args, robot_path: &Path, robot: &Robot) -> Result<(String, Model), Failure> {
+    let rejected =
+        |path: &Path, error: String| Failure::Rejected(Problem::of_file(path, error).into());
+    let own = robot.model.clone();
     if args.to == Target::IsaacLab {
-        return Ok(String::new());
+        return Ok((String::new(), own));
     }
     if args.to == Target::Sdf {
         let Some(path) = &args.model else {
@@ -120,16 +125,19 @@ fn source(args: &Args, robot_path: &Path, robot: &Robot) -> Result<String, Failu
                 "an SDF is corrected in place: give it with --model FILE".to_owned(),
             ));
         };
-        return std::fs::read_to_string(path)
-            .map_err(|error| Failure::Rejected(Problem::of_file(path, error.to_string()).into()));
+        let text =
+            std::fs::read_to_string(path).map_err(|error| rejected(path, error.to_string()))?;
+        return Ok((text, own));
     }
-    match robot::source(robot_path) {
-        Ok(Source::Mjcf(text)) => Ok(text),
+    let source = robot::source(robot_path);
+    match source.map_err(|error| rejected(robot_path, error.to_string()))? {
+        Source::Mjcf(text) if args.to == Target::Mjcf => Ok((text, own)),
+        // A URDF of the model states nothing of the drives yet.
+        Source::Mjcf(_) => {
+            robot::plain_urdf(&robot.urdf).map_err(|error| rejected(robot_path, error.to_string()))
+        }
         // With plausible bodies in place of impossible ones, as the twin has them.
-        Ok(Source::Urdf(_)) => Ok(robot.urdf.clone()),
-        Err(error) => Err(Failure::Rejected(
-            Problem::of_file(robot_path, error.to_string()).into(),
-        )),
+        Source::Urdf(_) => Ok((robot.urdf.clone(), own)),
     }
 }
 

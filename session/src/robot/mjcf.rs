@@ -6,6 +6,7 @@
 //! gravity in another direction turns the base.
 
 mod bodies;
+mod equalities;
 mod includes;
 mod names;
 mod text;
@@ -15,7 +16,6 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use mjcf_rs::body::{Body, Joint, JointType};
-use mjcf_rs::equality::Equality;
 use mjcf_rs::extras::ActuatorKind;
 use mjcf_rs::{BodyId, Model, ParseError};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -107,6 +107,17 @@ pub fn to_urdf(xml: &str, path: &Path) -> Result<(String, Vec<String>), MjcfErro
     };
     writer.robot()?;
     Ok((writer.text, writer.remarks))
+}
+
+/// A URDF of [`to_urdf`] without what only a MuJoCo model states.
+pub fn without_mujoco(urdf: &str) -> String {
+    // Each of these elements is a line of its own.
+    let is_kept = |line: &&str| !line.trim_start().starts_with("<mujoco:");
+    let lines: Vec<&str> = urdf.lines().filter(is_kept).collect();
+    lines
+        .join("\n")
+        .replace(&format!(" xmlns:mujoco=\"{MUJOCO}\""), "")
+        + "\n"
 }
 
 struct Writer<'a> {
@@ -265,11 +276,28 @@ impl Writer<'_> {
 
     /// The inertia of a body; `None` where it stands still: a mesh there needs no mass.
     fn mass(&self, id: BodyId, body: &Body, name: &str) -> Result<Option<Inertia>, NoInertia> {
-        if self.is_moved(id) {
-            inertia(self.model, body, name)
-        } else {
-            Ok(None)
+        if !self.is_moved(id) {
+            return Ok(None);
         }
+        let own = inertia(self.model, body, name)?;
+        // MuJoCo's condition: a body with joints, or one that is fixed to it, has a mass.
+        if own.is_none() && !body.joints.is_empty() && !self.carries_mass(id)? {
+            return Err(NoInertia::Massless(name.to_owned()));
+        }
+        Ok(own)
+    }
+
+    /// Whether a body that is fixed to this one has a mass.
+    fn carries_mass(&self, id: BodyId) -> Result<bool, NoInertia> {
+        for (child, entry) in self.model.bodies_iter() {
+            if entry.parent == Some(id) && child != id && entry.body.joints.is_empty() {
+                let own = inertia(self.model, &entry.body, &self.names.bodies[child])?;
+                if own.is_some() || self.carries_mass(child)? {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
     }
 
     /// Whether a joint moves a body.
@@ -341,56 +369,5 @@ impl Writer<'_> {
             escaped(parent),
             escaped(child)
         );
-    }
-
-    /// The `<mimic>` of a joint that an equality constraint ties to another by a straight line.
-    fn mimic(&self, name: &str) -> String {
-        let ties = self.model.equality.iter();
-        let own = ties.filter_map(|tie| match tie {
-            Equality::Joint(tie) if tie.common.active && tie.joint1 == name => Some(tie),
-            _ => None,
-        });
-        let reference = |name: &str| {
-            let joint = self.model.joint_by_name(name);
-            joint.map_or(0.0, |(body, k)| self.model.bodies[body].body.joints[k].ref_)
-        };
-        let of = |tie: &mjcf_rs::equality::EqualityJoint| {
-            let other = tie.joint2.as_deref()?;
-            let [offset, ratio, rest @ ..] = tie.polycoef;
-            // Both positions of the constraint count from their references.
-            let offset = offset + reference(name) - ratio * reference(other);
-            rest.iter().all(|c| *c == 0.0).then(|| {
-                format!(
-                    "    <mimic joint=\"{}\" multiplier=\"{ratio}\" offset=\"{offset}\"/>\n",
-                    escaped(other)
-                )
-            })
-        };
-        own.into_iter().find_map(of).unwrap_or_default()
-    }
-
-    /// Says which constraints the tree of bodies does not have.
-    fn couplings(&mut self) {
-        let is_loop = |tie: &&Equality| match tie {
-            Equality::Connect(tie) => tie.common.active,
-            Equality::Weld(tie) => tie.common.active,
-            Equality::Joint(tie) => {
-                tie.common.active
-                    && tie.joint2.is_some()
-                    && tie.polycoef[2..].iter().any(|c| *c != 0.0)
-            }
-            Equality::Tendon(tie) => tie.common.active,
-        };
-        let loops = self.model.equality.iter().filter(is_loop).count();
-        if loops > 0 {
-            self.remarks.push(format!(
-                "{loops} equality constraints (closed loops, tendons, curves) are not part of the twin, which is a tree of bodies"
-            ));
-        }
-        if !self.model.tendons.is_empty() {
-            let count = self.model.tendons.len();
-            self.remarks
-                .push(format!("{count} tendons are not part of the twin"));
-        }
     }
 }

@@ -1,6 +1,6 @@
 """Robots that cannot be: inertias that no body has."""
 
-from lib.arm import ARM, urdf
+from lib.arm import ARM, mjcf, urdf
 from lib.session import session
 from lib.trial import CELL, REPORT, Run, Trial, calibrate, done, explain, init, near, refused
 
@@ -82,7 +82,8 @@ def other_formats(folder):
         '  <xacro:property name="height" value="0.18"/>\n  <link name="foot"/>\n'
         '  <xacro:include filename="$(find crane5_description)/urdf/links.xacro"/>\n</robot>\n'
     )
-    (folder / "arm.xml").write_text(
+    (folder / "arm.xml").write_text(mjcf())
+    (folder / "massless.xml").write_text(
         '<mujoco model="crane5">\n  <worldbody>\n    <body name="column">\n'
         '      <joint name="j_base" axis="0 0 1"/>\n    </body>\n  </worldbody>\n</mujoco>\n'
     )
@@ -122,7 +123,8 @@ TRIALS = [
         (
             init(refused("xacro", r"xacro \S+\.xacro"), robot="arm.xacro", short=True),
             explain(refused("xacro", r"xacro \S+\.xacro"), robot="arm.xacro"),
-            init(refused(r"MJCF|MuJoCo", "URDF"), robot="arm.xml", short=True),
+            init(refused(r"MJCF|MuJoCo", near("column", "mass")), robot="massless.xml", short=True),
+            explain(done(REPORT), robot="arm.xml"),
         ),
     ),
 ]

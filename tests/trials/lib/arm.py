@@ -113,6 +113,24 @@ def urdf(arm=ARM, prefix="", joint_type="revolute", decimal=".", extra=""):
     return f'<?xml version="1.0"?>\n<robot name="{arm.name}">\n{root}{body}{extra}</robot>\n'
 
 
+def mjcf(arm=ARM):
+    """The arm as a MuJoCo model; `fullinertia` is in the order xx, yy, zz, xy, xz, yz."""
+
+    def text(*values):
+        return " ".join(f"{value:g}" for value in values)
+
+    lines = []
+    for j in arm.joints:
+        xx, xy, xz, yy, yz, zz = j.inertia
+        lines += [
+            f'<body name="{j.link}" pos="{text(*j.origin)}">',
+            f'<inertial mass="{text(j.mass)}" pos="{text(*j.com)}" fullinertia="{text(xx, yy, zz, xy, xz, yz)}"/>',
+            f'<joint name="{j.name}" axis="{text(*j.axis)}"/>',
+        ]
+    body = "\n".join(lines + ["</body>"] * len(arm.joints))
+    return f'<mujoco model="{arm.name}">\n<worldbody>\n{body}\n</worldbody>\n</mujoco>\n'
+
+
 def rotation(axis, angle):
     """Rotation matrices about a unit axis (Rodrigues), one for each angle."""
     x, y, z = axis

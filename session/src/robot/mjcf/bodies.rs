@@ -18,6 +18,9 @@ pub enum NoInertia {
     /// It follows from a mesh.
     #[error("the mass of body `{0}`, which has no <inertial> and a mesh")]
     OfMesh(String),
+    /// It moves without any, which MuJoCo refuses, too.
+    #[error("the mass of body `{0}`, which moves and has neither <inertial> nor geoms with a mass")]
+    Massless(String),
 }
 
 /// The inertia of a body in its own frame; `None` where it has no mass.
