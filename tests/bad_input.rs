@@ -241,3 +241,25 @@ fn a_recording_without_efforts_is_no_recording_without_contacts() {
         replayed.stdout
     );
 }
+
+/// Guards against an index beyond a sample's joints: a hand of 24 joints in one recording.
+#[test]
+fn a_recording_of_more_joints_than_a_sample_has_is_refused_with_a_way_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let names: Vec<String> = (0..24).map(|j| format!("finger_{j}")).collect();
+    let head = names
+        .iter()
+        .map(|name| format!(",{name}.position,{name}.velocity,{name}.effort"));
+    let mut text = format!("time{}\n", head.collect::<String>());
+    for row in 0..50 {
+        text += &format!(
+            "{}{}\n",
+            0.01 * f64::from(row),
+            ",0.1,0,0.2".repeat(names.len())
+        );
+    }
+    let path = write(&folder.path().join("hand.csv"), &text);
+    let out = Out::answer(["info", path.to_str().unwrap()]);
+    let said = format!("{}{}", out.stdout, out.stderr);
+    assert!(said.contains("24 joints, and at most 16"), "{said}");
+}

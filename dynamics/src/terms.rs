@@ -17,6 +17,7 @@ mod concealed;
 mod contact_wall;
 mod coulomb_friction;
 mod counterbalance_spring;
+mod creeping_friction;
 mod delay_line;
 mod displaced;
 mod drive;
@@ -116,6 +117,7 @@ pub static EFFECTS: &[&Effect] = &[
     &gear_efficiency::EFFECT,
     &eccentric_gear::EFFECT,
     &presliding_hysteresis::EFFECT,
+    &creeping_friction::EFFECT,
     &quadratic_drag::EFFECT,
     &temperature_viscous::EFFECT,
     &friction_step::EFFECT,

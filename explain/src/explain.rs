@@ -37,6 +37,7 @@ pub fn explain(
         return Ok(not_evaluated(&input, joints, reason));
     }
     let at_rest = audit::at_rest(&input);
+    let is_parted = input.is_parted() && !at_rest;
     if input.holdout.is_empty() && !at_rest {
         input.hold_out_some();
     }
@@ -59,10 +60,9 @@ pub fn explain(
     loop {
         let (stop, errors) = match attempt(&mut input, at_rest, &slips, &joints, progress)? {
             Attempt::Done(mut outcome) => {
-                outcome
-                    .report
-                    .notes
-                    .extend(excerpts.map(notes::in_excerpts));
+                let notes = &mut outcome.report.notes;
+                notes.extend(excerpts.map(notes::in_excerpts));
+                notes.extend(is_parted.then(notes::is_parted));
                 return Ok(*outcome);
             }
             Attempt::Stopped(stop, errors) => (stop, errors),

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use tauscope_archive::{ArchiveError, Twice};
+use tauscope_bus::MAX_JOINTS;
 
 use crate::finding::{Finding, shared};
 use crate::publisher::Publisher;
@@ -33,6 +34,18 @@ pub enum SessionError {
         path: PathBuf,
         /// The topics.
         topics: Vec<String>,
+    },
+    /// There are more joints than a sample has room for.
+    #[error(
+        "{}: {found} joints, and at most {MAX_JOINTS} can be compared at once: explain parts of the robot one after the other, each with a \
+         robot file in which the joints of the others are fixed",
+        path.display()
+    )]
+    TooManyJoints {
+        /// The recording.
+        path: PathBuf,
+        /// Number of joints.
+        found: usize,
     },
     /// None of its joint states can be used.
     #[error("{}: {why}", path.display())]

@@ -1,6 +1,7 @@
 //! The first look at a recording: topic, publishers, clock and ranges, from its head.
 
 use tauscope_archive::{ArchiveError, JointFacts, JointTallies, Recording, ros};
+use tauscope_bus::MAX_JOINTS;
 
 use crate::assembler::{Assembler, Taken};
 use crate::clock::{Clock, Stamps};
@@ -146,6 +147,12 @@ impl Look {
         }
         if joint_names.is_empty() {
             joint_names = published(&publishers.all);
+        }
+        if joint_names.len() > MAX_JOINTS {
+            return Err(SessionError::TooManyJoints {
+                path: recording.path().to_owned(),
+                found: joint_names.len(),
+            });
         }
         let used = choose(&publishers.all, &joint_names);
         let limits =

@@ -21,14 +21,25 @@ fn not_evaluated(out: &Path, done: &Out, reason: &str) {
 }
 
 #[test]
-fn one_recording_proves_nothing() {
+fn one_recording_that_is_too_short_to_be_parted_proves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     // Of an explanation before nothing may be left beside a report that names nothing.
     std::fs::create_dir(&out).unwrap();
     write(&out.join("report.json"), "{}");
     write(&out.join("twin.yaml"), "");
-    let (robot, recording) = (robot("slide"), case("m01/rec_00.mcap"));
+    let joints = ["rail", "turn", "lift", "elbow", "bend", "roll"];
+    let head = joints.map(|name| format!(",{name}.position,{name}.velocity,{name}.effort"));
+    let mut text = format!("time{}\n", head.concat());
+    for row in 0..150 {
+        let t = 0.01 * f64::from(row);
+        let values = format!(",{},{},{}", t.sin(), t.cos(), 2.0 * t.cos());
+        text += &format!("{t}{}\n", values.repeat(joints.len()));
+    }
+    let (robot, recording) = (
+        robot("slide"),
+        write(&folder.path().join("short.csv"), &text),
+    );
     let done = explain(
         &out,
         &[

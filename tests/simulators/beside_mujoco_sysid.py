@@ -35,22 +35,13 @@ def spec_of(path):
     return spec
 
 
-def table_of(path, m):
-    """Positions, velocities and efforts of a recording."""
-    with open(path) as file:
-        names = file.readline().strip().split(",")
-    rows = np.loadtxt(path, delimiter=",", skiprows=1)
-    column = lambda kind: rows[:, [names.index(f"{m.joint(j).name}.{kind}") for j in range(m.njnt)]]
-    return column("position"), column("velocity"), column("effort")
-
-
 def windows(folder, m):
     """Initial states, efforts, and the motions that follow, of the fitted recordings."""
     state, control, motion = [], [], []
     for k in range(prove.RECORDINGS):
         if k == prove.HELD_OUT:
             continue
-        q, v, e = table_of(folder / f"rec_{k}.csv", m)
+        q, v, e = prove.recorded(folder / f"rec_{k}.csv", m)
         for at in range(0, len(q) - WINDOW - 1, WINDOW * EVERY):
             state.append(np.concatenate([[0.], q[at], v[at]]))
             control.append(np.repeat(e[at:at + WINDOW], 2, axis=0))

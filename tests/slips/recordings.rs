@@ -49,11 +49,6 @@ const SLIPS: &[Slip] = &[
         says: &["the file is empty"],
     },
     Slip {
-        typed: "explain --robot @demo_arm.urdf --fit @demo.mcap --out @x7",
-        code: 0,
-        says: &["only one recording"],
-    },
-    Slip {
         typed: "explain --robot @demo_arm.urdf --fit @demo.mcap @demo_validation.mcap --twin @pipeline.yaml --out @x8",
         code: 2,
         says: &["`robot` is missing"],

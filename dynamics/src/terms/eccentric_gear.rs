@@ -31,7 +31,7 @@ pub(super) static EFFECT: Effect = Effect {
     coordinates: &[
         Coordinate::factor("sine_nm"),
         Coordinate::factor("cosine_nm"),
-        Coordinate::shape("cycles_per_rev", 1.0, 24.0, 24, Scale::Linear),
+        Coordinate::shape("cycles_per_rev", 1.0, 24.0, 24, Scale::Waves),
     ],
     to_parameters: wave::to_parameters,
     to_coordinates: wave::to_coordinates,

@@ -33,7 +33,7 @@ pub(super) static EFFECT: Effect = Effect {
     coordinates: &[
         Coordinate::factor("sine_share"),
         Coordinate::factor("cosine_share"),
-        Coordinate::shape("cycles_per_rev", 1.0, 8.0, 8, Scale::Linear),
+        Coordinate::shape("cycles_per_rev", 1.0, 8.0, 8, Scale::Waves),
     ],
     to_parameters: wave::to_parameters,
     to_coordinates: wave::to_coordinates,

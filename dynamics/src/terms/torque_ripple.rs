@@ -30,7 +30,7 @@ pub(super) static EFFECT: Effect = Effect {
     coordinates: &[
         Coordinate::factor("sine_nm"),
         Coordinate::factor("cosine_nm"),
-        Coordinate::shape("cycles_per_rev", 1.0, 64.0, 64, Scale::Linear),
+        Coordinate::shape("cycles_per_rev", 1.0, 64.0, 64, Scale::Waves),
     ],
     to_parameters: |c| {
         let (sine, cosine) = (0.0 - c[0], 0.0 - c[1]);

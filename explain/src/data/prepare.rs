@@ -136,6 +136,7 @@ impl Problem {
             variances[j].sort_by(f64::total_cmp);
             let variance = variances[j][variances[j].len() / 2];
             problem.white_noise[j] = deviation(variance, problem.largest_effort[j]);
+            problem.position_gaps[j] = middle_gap(&problem.tracks, j, n);
         }
         problem
     }
@@ -152,6 +153,7 @@ impl Problem {
             weight: Vec::new(),
             white_noise: vec![0.0; n],
             largest_effort: vec![0.0; n],
+            position_gaps: vec![0.0; n],
             cutoff_hz,
             known_friction: vec![BTreeMap::new(); n],
             is_foreign: false,
@@ -171,6 +173,30 @@ fn leave_out_unmeasured(counts: &mut [bool], recording: &Recording, joint: usize
     if is_unmeasured(recording, joint, n) {
         counts.fill(false);
     }
+}
+
+/// Distance of neighbouring positions in the middle of a joint's range: half of the range is covered more finely.
+fn middle_gap(tracks: &[FitTrack], joint: usize, n: usize) -> f64 {
+    let own = |track: &FitTrack| {
+        track
+            .track
+            .position
+            .clone()
+            .into_iter()
+            .skip(joint)
+            .step_by(n)
+    };
+    let mut positions: Vec<f64> = tracks.iter().flat_map(own).collect();
+    positions.sort_by(f64::total_cmp);
+    let mut gaps: Vec<f64> = positions.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    gaps.sort_by(|a, b| b.total_cmp(a));
+    let half = 0.5 * gaps.iter().sum::<f64>();
+    let mut covered = 0.0;
+    let reaches = |gap: &&f64| {
+        covered += **gap;
+        covered >= half
+    };
+    gaps.iter().find(reaches).copied().unwrap_or(0.0)
 }
 
 /// Standard deviation of a noise, no less than what the numbers of a driver resolve.

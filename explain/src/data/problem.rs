@@ -32,6 +32,8 @@ pub struct Problem {
     pub white_noise: Vec<f64>,
     /// Largest measured effort by joint, unfiltered \[N m\].
     pub largest_effort: Vec<f64>,
+    /// Distance of neighbouring positions in the middle of the range, by joint \[rad or m\].
+    pub position_gaps: Vec<f64>,
     /// Half amplitude of the filter \[Hz\].
     pub cutoff_hz: f64,
     /// Coulomb and viscous friction by joint that the twin has already: by so much they may be less.
@@ -62,6 +64,12 @@ impl Problem {
             .map(first_s)
             .fold(f64::INFINITY, f64::min);
         (first, self.tracks.iter().map(last_s).fold(first, f64::max))
+    }
+
+    /// Waves over a turn of a joint that its positions resolve: two a wave (Shannon, "Communication in the Presence of Noise", 1949,
+    /// theorem 1). Between poses far apart, faster waves are any function.
+    pub fn most_waves(&self, joint: usize) -> f64 {
+        std::f64::consts::PI / self.position_gaps[joint]
     }
 
     /// What the twin says without any physics beside it.

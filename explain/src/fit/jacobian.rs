@@ -128,7 +128,7 @@ pub(crate) fn step_of(problem: &Problem, active: &Active, c: usize) -> f64 {
             ..
         } => match scale {
             Scale::Log => SHAPE_STEP * value.abs().max(lower),
-            Scale::Linear => SHAPE_STEP * (upper - lower),
+            Scale::Linear | Scale::Waves => SHAPE_STEP * (upper - lower),
             Scale::OfEffort => {
                 SHAPE_STEP * problem.largest_effort[active.hypothesis.place.joint].max(1e-9)
             }

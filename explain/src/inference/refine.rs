@@ -183,6 +183,10 @@ pub fn bounds(problem: &Problem, active: &Active, c: usize) -> (f64, f64) {
                 let largest = problem.largest_effort[active.hypothesis.place.joint];
                 (lower * largest, upper * largest)
             }
+            Scale::Waves => {
+                let most = problem.most_waves(active.hypothesis.place.joint);
+                (lower, upper.min(most).max(lower))
+            }
             Scale::Log | Scale::Linear => (lower, upper),
         },
         CoordinateKind::RecordingTime | CoordinateKind::SessionTime => {

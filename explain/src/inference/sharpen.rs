@@ -182,7 +182,7 @@ impl Search<'_> {
                 } => {
                     let steps = (steps - 1).max(1) as f64;
                     match scale {
-                        Scale::Linear => (upper - lower) / steps,
+                        Scale::Linear | Scale::Waves => (upper - lower) / steps,
                         Scale::Log => shape[c] * (upper / lower).ln() / steps,
                         Scale::OfEffort => {
                             let largest = self.problem.largest_effort[self.hypothesis.place.joint];

@@ -42,6 +42,8 @@ pub struct Variant {
     pub log_prior: f64,
     /// Whether every explanation has it.
     pub is_forced: bool,
+    /// Whether it corrects friction that the twin states already.
+    pub corrects_stated: bool,
     /// The curve of an `unknown`.
     pub curve: Option<Curve>,
 }
@@ -103,14 +105,17 @@ impl Variant {
     }
 
     /// Whether one explanation cannot have both: laws nest, so a place has one of all laws that contain the same simplest
-    /// one; a joint's effort is late in one way; and a joint has one unknown law, since sums of several describe anything.
+    /// one; a joint's effort is late in one way; and a joint has one unknown law, since sums of several describe anything. Less of
+    /// the friction that the twin states and another law of it can be true together: the one takes the other's place.
     pub fn excludes(&self, other: &Self) -> bool {
         let (own, others) = (self.hypothesis, other.hypothesis);
         if own.is_of_timing() && others.is_of_timing() {
             let (a, b) = (own.only_joint(), others.only_joint());
             return a.is_none() || b.is_none() || a == b;
         }
-        own.place == others.place && simplest(own) == simplest(others)
+        own.place == others.place
+            && simplest(own) == simplest(others)
+            && self.corrects_stated == other.corrects_stated
     }
 
     /// Indices of its columns: the offset, if it has one, and those of its factors.
@@ -335,6 +340,7 @@ fn given(
         TimeKind::EveryRecording | TimeKind::Once => 2.0 * TIMES.ln(),
     };
     let is_forced = hypothesis.is_torque_scale();
+    let stated = problem.known_friction[hypothesis.place.joint].get(hypothesis.effect.name);
     let log_prior = if is_forced {
         0.0
     } else {
@@ -356,6 +362,7 @@ fn given(
             positive: positive.collect(),
             log_prior,
             is_forced,
+            corrects_stated: stated.is_some_and(|known| *known > 0.0 && known.is_finite()),
             curve: None,
         },
         alone,

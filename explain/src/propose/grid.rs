@@ -21,7 +21,7 @@ pub fn shapes(problem: &Problem, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
                 scale,
             } => {
                 let of = |share: f64| match scale {
-                    Scale::Linear => lower + share * (upper - lower),
+                    Scale::Linear | Scale::Waves => lower + share * (upper - lower),
                     Scale::Log => lower * (upper / lower).powf(share),
                     Scale::OfEffort => {
                         let largest = problem.largest_effort[hypothesis.place.joint];
@@ -34,9 +34,12 @@ pub fn shapes(problem: &Problem, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
                 } else {
                     steps
                 };
-                (0..steps)
-                    .map(|k| of(k as f64 / (steps - 1).max(1) as f64))
-                    .collect()
+                let most = match scale {
+                    Scale::Waves => problem.most_waves(hypothesis.place.joint).max(lower),
+                    _ => f64::INFINITY,
+                };
+                let all = (0..steps).map(|k| of(k as f64 / (steps - 1).max(1) as f64));
+                all.filter(|value| *value <= most).collect()
             }
             _ => vec![0.0],
         };

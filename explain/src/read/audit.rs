@@ -38,12 +38,12 @@ pub fn before(input: &Input) -> Option<String> {
             recording.duration_s()
         ));
     }
-    if input.fit.len() + input.holdout.len() < 2
-        && input.found_before().is_none()
-        && !at_rest(input)
-    {
+    // Of a single recording the last quarter is held out, which must be long enough, too.
+    let is_short =
+        |r: &Recording| r.len() < 4 * LEAST_SAMPLES || r.duration_s() < 4.0 * LEAST_DURATION_S;
+    if input.is_parted() && !at_rest(input) && input.fit.iter().any(is_short) {
         return Some(
-            "there is only one recording, and a fit must be tested on another one. Record the same arm once more, \
+            "there is only one recording, and it is too short for a part of it to be held out. Record the same arm once more, \
              with another motion, or start from a corrected twin"
                 .to_owned(),
         );

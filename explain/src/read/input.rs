@@ -32,6 +32,8 @@ pub struct Input {
 
 /// Recordings for each one that is held out. Chosen: most of the data is fitted.
 const FOR_ONE_HELD_OUT: usize = 4;
+/// Appended to the name of a single recording's held-out end.
+const LAST_PART: &str = "_last_quarter";
 
 impl Input {
     /// The corrected twin that was found on this arm before, if it is the start.
@@ -39,8 +41,24 @@ impl Input {
         self.start.as_ref().filter(|start| start.was_found)
     }
 
-    /// Holds out some of the recordings to fit: a quarter, of middle travel.
+    /// Whether the end of the only recording is held out: there is no other, and nothing to compare it with.
+    pub fn is_parted(&self) -> bool {
+        self.fit.len() == 1 && self.holdout.is_empty() && self.found_before().is_none()
+    }
+
+    /// Holds out some of the recordings to fit: a quarter, of middle travel. Of a single recording its end: motion goes on where
+    /// nothing was fitted.
     pub fn hold_out_some(&mut self) {
+        if self.is_parted()
+            && let Some(only) = self.fit.pop()
+        {
+            let at_s = only.duration_s() * (1.0 - 1.0 / FOR_ONE_HELD_OUT as f64);
+            let (begin, mut end) = only.parted(at_s);
+            end.name += LAST_PART;
+            self.fit.push(begin);
+            self.holdout.push(end);
+            return;
+        }
         let joints = self.model.dof();
         let held_out = of_middle_travel(&self.fit, joints);
         let all = std::mem::take(&mut self.fit).into_iter().enumerate();
@@ -82,6 +100,19 @@ fn travel(recording: &Recording, joints: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::fixture::{model, recording};
+
+    #[test]
+    fn the_end_of_a_single_recording_answers_its_own_rows_only() {
+        let whole = recording(&model(), 1, |_, _, _| {});
+        let at_s = 0.75 * whole.duration_s();
+        let (begin, end) = whole.clone().parted(at_s);
+        assert_eq!(begin.len() + end.len(), whole.len());
+        assert!(begin.duration_s() < at_s && end.time_s[0] == 0.0);
+        let rows = begin.sample_of_row.iter().zip(&end.sample_of_row);
+        assert!(rows.clone().all(|(a, b)| a.is_some() != b.is_some()));
+        assert_eq!(end.sample_of_row.last(), Some(&Some(end.len() - 1)));
+        assert_eq!(end.position[0], whole.position[begin.position.len()]);
+    }
 
     #[test]
     fn a_standing_arm_and_the_liveliest_motion_are_fitted() {

@@ -55,6 +55,11 @@ pub fn not_handed_out(proof: &Proof, found: &Fit, model: &Model, unit: &str) -> 
     notes
 }
 
+/// That the only recording was parted.
+pub fn is_parted() -> String {
+    "There is one recording: its last quarter was held out. A second recording with another motion is the better test.".to_owned()
+}
+
 /// That a long session was fitted in excerpts.
 pub fn in_excerpts(excerpts: Excerpts) -> String {
     let Excerpts { whole_s, kept_s } = excerpts;

@@ -33,8 +33,12 @@ const GRAVITY_M_S2: f64 = 9.81;
 const GRAVITY_SHARE: f64 = 0.01;
 /// Smallest turn of gravity that counts \[rad\]. Resolution: of seven digits in a file.
 const LEAST_TURN_RAD: f64 = 1e-6;
-/// Name of the link that stands for MuJoCo's world.
+/// Limit of effort and velocity of a joint that has none. Interface: readers of URDF ask for both and refuse `inf`.
+const NO_LIMIT: &str = "1e9";
+/// Name of the root link: readers of URDF take a link of this name for their fixed world.
 const WORLD: &str = "world";
+/// Name of the link of MuJoCo's world where gravity does not point down in it.
+const TURNED_WORLD: &str = "turned_world";
 
 /// Why a MuJoCo model cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -114,10 +118,9 @@ pub fn without_mujoco(urdf: &str) -> String {
     // Each of these elements is a line of its own.
     let is_kept = |line: &&str| !line.trim_start().starts_with("<mujoco:");
     let lines: Vec<&str> = urdf.lines().filter(is_kept).collect();
-    lines
-        .join("\n")
-        .replace(&format!(" xmlns:mujoco=\"{MUJOCO}\""), "")
-        + "\n"
+    let text = lines.join("\n") + "\n";
+    text.replace(&format!(" xmlns:mujoco=\"{MUJOCO}\""), "")
+        .replace("=\"inf\"", &format!("=\"{NO_LIMIT}\""))
 }
 
 struct Writer<'a> {
@@ -193,10 +196,11 @@ impl Writer<'_> {
         let turned = Isometry3::from_parts(Translation3::identity(), turn);
         let _ = writeln!(
             self.text,
-            "  <link name=\"plumb\"/>\n  <link name=\"{WORLD}\"/>\n  <joint name=\"gravity\" type=\"fixed\">\n    {}\n    \
-             <parent link=\"plumb\"/>\n    <child link=\"{WORLD}\"/>\n  </joint>",
+            "  <link name=\"{WORLD}\"/>\n  <link name=\"{TURNED_WORLD}\"/>\n  <joint name=\"gravity\" type=\"fixed\">\n    {}\n    \
+             <parent link=\"{WORLD}\"/>\n    <child link=\"{TURNED_WORLD}\"/>\n  </joint>",
             origin(&turned)
         );
+        TURNED_WORLD.clone_into(&mut self.names.bodies[0]);
     }
 
     fn body(&mut self, id: BodyId, parent: BodyId, body: &Body) -> Result<(), MjcfError> {

@@ -154,6 +154,8 @@ pub enum CoordinateKind {
 pub enum Scale {
     /// Evenly.
     Linear,
+    /// Evenly, as waves over a turn of the joint: no more than its positions resolve.
+    Waves,
     /// By a constant ratio.
     Log,
     /// As shares of the largest effort of the joint.

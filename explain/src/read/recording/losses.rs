@@ -59,6 +59,23 @@ impl Recording {
         }
     }
 
+    /// The samples before a time \[s\] and those from it on, as two recordings. Findings and losses are those of the first.
+    pub(crate) fn parted(mut self, at_s: f64) -> (Self, Self) {
+        let is_late: Vec<bool> = self.time_s.iter().map(|time_s| *time_s >= at_s).collect();
+        let of = |recording: &mut Self, late: bool| {
+            let rows = recording.sample_of_row.iter_mut();
+            rows.for_each(|row| *row = row.filter(|sample| is_late[*sample] == late));
+            let kept: Vec<bool> = is_late.iter().map(|is_late| *is_late == late).collect();
+            recording.keep(&kept);
+        };
+        let mut end = self.clone();
+        end.losses = Losses::default();
+        end.findings.clear();
+        of(&mut end, true);
+        of(&mut self, false);
+        (self, end)
+    }
+
     /// Keeps these samples alone. The rows of the others are answered by the sample before.
     pub(crate) fn keep(&mut self, is_kept: &[bool]) {
         let n = self.position.len() / is_kept.len().max(1);
