@@ -259,7 +259,22 @@ fn a_recording_of_more_joints_than_a_sample_has_is_refused_with_a_way_out() {
         );
     }
     let path = write(&folder.path().join("hand.csv"), &text);
-    let out = Out::answer(["info", path.to_str().unwrap()]);
-    let said = format!("{}{}", out.stdout, out.stderr);
-    assert!(said.contains("24 joints, and at most 16"), "{said}");
+    let body = "<inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial>";
+    let mut robot = "<robot name=\"hand\"><link name=\"palm\"/>".to_owned();
+    for name in &names {
+        robot += &format!(
+            "<link name=\"{name}_link\">{body}</link><joint name=\"{name}\" type=\"continuous\"><parent link=\"palm\"/>\
+             <child link=\"{name}_link\"/><axis xyz=\"0 0 1\"/></joint>"
+        );
+    }
+    let robot = write(&folder.path().join("hand.urdf"), &(robot + "</robot>"));
+    let report = folder.path().join("report");
+    let [path, robot, report] = [&path, &robot, &report].map(|path| path.to_str().unwrap());
+    let out = Out::answer(["explain", path, "--robot", robot, "--out", report]);
+    assert_eq!(out.code, 2, "{}", out.stdout);
+    assert!(
+        out.stderr.contains("24 joints, and at most 16"),
+        "{}",
+        out.stderr
+    );
 }

@@ -111,6 +111,7 @@ impl Context<'_> {
             problem.known_friction = vec![library::any_plain_friction(); problem.joints];
         }
         if let Some(start) = &self.input.start {
+            problem.states_friction = !start.was_found;
             problem.known_friction = start.friction(&self.input.model);
             if self.input.torque_constants_nm_per_a.is_none() {
                 for (known, unit) in problem.known_friction.iter_mut().zip(self.unit_nm) {

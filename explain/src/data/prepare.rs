@@ -156,6 +156,7 @@ impl Problem {
             position_gaps: vec![0.0; n],
             cutoff_hz,
             known_friction: vec![BTreeMap::new(); n],
+            states_friction: false,
             is_foreign: false,
             first_gains: vec![1.0; model.dof()],
             cache: Arc::default(),

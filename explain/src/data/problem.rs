@@ -38,6 +38,8 @@ pub struct Problem {
     pub cutoff_hz: f64,
     /// Coulomb and viscous friction by joint that the twin has already: by so much they may be less.
     pub known_friction: Vec<BTreeMap<&'static str, f64>>,
+    /// Whether that friction is what the robot's file states, not what was found on this arm before.
+    pub states_friction: bool,
     /// Whether the twin's effort is another simulation's, which follows the command and not the motion.
     pub is_foreign: bool,
     /// By joint, the gain that the fit of an unknown torque scale starts from \[effort unit per model unit\].

@@ -42,7 +42,7 @@ pub struct Variant {
     pub log_prior: f64,
     /// Whether every explanation has it.
     pub is_forced: bool,
-    /// Whether it corrects friction that the twin states already.
+    /// Whether it corrects friction that the robot's file states.
     pub corrects_stated: bool,
     /// The curve of an `unknown`.
     pub curve: Option<Curve>,
@@ -106,7 +106,7 @@ impl Variant {
 
     /// Whether one explanation cannot have both: laws nest, so a place has one of all laws that contain the same simplest
     /// one; a joint's effort is late in one way; and a joint has one unknown law, since sums of several describe anything. Less of
-    /// the friction that the twin states and another law of it can be true together: the one takes the other's place.
+    /// the friction that the robot's file states and another law of it can be true together: the one takes the other's place.
     pub fn excludes(&self, other: &Self) -> bool {
         let (own, others) = (self.hypothesis, other.hypothesis);
         if own.is_of_timing() && others.is_of_timing() {
@@ -362,7 +362,7 @@ fn given(
             positive: positive.collect(),
             log_prior,
             is_forced,
-            corrects_stated: stated.is_some_and(|known| *known > 0.0 && known.is_finite()),
+            corrects_stated: problem.states_friction && stated.is_some_and(|known| *known > 0.0),
             curve: None,
         },
         alone,
