@@ -42,6 +42,7 @@ mod same_contact;
 mod secure_router;
 mod shell;
 mod silence;
+mod simulators;
 mod slips;
 mod streaming;
 mod supervision;

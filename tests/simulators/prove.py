@@ -1,6 +1,6 @@
 """Proof in the simulator itself: what `explain` writes into a MuJoCo model, simulated again.
 
-    python3 tests/simulators/prove.py TAUSCOPE OUT [--cases arm7,folded] [--table]
+    python3 tests/simulators/prove.py TAUSCOPE OUT [--cases arm7,folded] [--check] [--table]
 
 Needs requirements.txt. Each case is a model of models/ in which three things are changed in secret: the plant. It follows motions under a
 controller of joint torques, and is recorded: positions, velocities and efforts with noise, 250 Hz. `explain` gets the model without the
@@ -18,6 +18,7 @@ import json
 import pathlib
 import shutil
 import subprocess
+import sys
 import time
 
 import mujoco
@@ -231,6 +232,19 @@ def table(results):
     return "\n".join(lines) + f"\n\nThe rollout's error falls to {np.median(ratios):.3f} of what it was in the median of {len(ratios)} cases."
 
 
+def faults(results):
+    """Where a case misses what docs/simulators.md promises, a sentence each."""
+    for r in results:
+        before, said, *simulated = r["inverse"].values()
+        if any(abs(x - said) > 0.02 * before for x in simulated):
+            yield f"{r['case']}: residuals in the simulators, {simulated}, are not the report's {said}, of {before} before"
+        (old, new) = r["rollout"]
+        if any(a > b * 1.02 + 1e-6 for b, a in zip(old, new)):
+            yield f"{r['case']}: a joint is further off in the rollout: {old} before, {new} after"
+        if rms(new) > 0.2 * rms(old):
+            yield f"{r['case']}: the rollout's error falls from {rms(old)} to {rms(new)} only"
+
+
 def picture(result, joint):
     """An SVG of a joint's position: measured, and simulated as it was and as it was written."""
     width, height, left, top = 720, 260, 56, 18
@@ -260,6 +274,7 @@ def main():
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--cases", default=",".join(CASES))
     parser.add_argument("--seed", type=int, default=11)
+    parser.add_argument("--check", action="store_true", help="exit code 1 if a case misses what docs/simulators.md promises")
     parser.add_argument("--table", action="store_true", help="only print the table of what is there")
     parser.add_argument("--svg", type=pathlib.Path, help="a picture of the first case's rollout, at the joint that was furthest off")
     args = parser.parse_args()
@@ -273,6 +288,9 @@ def main():
                 explain(args.tauscope, folder, CASES[name][0])
         results.append(judge(args.tauscope, folder, name))
     print(table(results))
+    missed = list(faults(results)) if args.check else []
+    if missed:
+        sys.exit("\n".join(missed))
     if args.svg:
         args.svg.write_text(picture(results[0], int(np.argmax(results[0]["rollout"][0]))))
 

@@ -1,6 +1,6 @@
 //! Quantities that the terms of a twin change in a robot's model.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_dynamics::terms::{Quantity, TermSpec};
 use tauscope_dynamics::{Drive, Inertia, Model};
@@ -46,10 +46,11 @@ pub struct Corrections {
 
 impl Corrections {
     /// The changes that these terms make in the model of a robot. Terms of the same kind add up. Of bodies, those that `findings` name
-    /// count: a twin also has the usual errors of all others, which are no correction.
+    /// count, as the twin has them: a twin also has the usual errors of all others, which are no correction.
     pub fn of(model: &Model, terms: &[TermSpec], findings: &[Finding]) -> Self {
         let mut all = Self::default();
         let mut turned = model.clone();
+        let named = named_links(model, terms, findings);
         for spec in terms {
             let Ok(effect) = spec.effect() else { continue };
             let place = spec.joint.as_ref().or(spec.link.as_ref());
@@ -68,7 +69,7 @@ impl Corrections {
             };
             for quantity in quantities {
                 match quantity {
-                    Quantity::Body => all.add_body(model, spec, findings),
+                    Quantity::Body => all.add_body(model, spec, &named),
                     Quantity::Gravity => {
                         if let Ok(term) = spec.build(model) {
                             term.alter(&mut turned);
@@ -107,28 +108,39 @@ impl Corrections {
         self.joints.is_empty() && self.bodies.is_empty() && self.gravity.is_none()
     }
 
-    fn add_body(&mut self, model: &Model, spec: &TermSpec, findings: &[Finding]) {
-        let Some((link, change)) = spec.build(model).ok().and_then(|term| term.inertia()) else {
-            return;
-        };
+    /// Adds what a term adds to its link, if the link is one of `named`.
+    fn add_body(&mut self, model: &Model, spec: &TermSpec, named: &BTreeSet<usize>) {
+        let body = body_of(model, spec).filter(|(link, _)| named.contains(link));
+        let Some((link, change)) = body else { return };
         let link = &model.links()[link];
-        let mover = link.joint.map(|joint| &model.joints()[joint].name);
-        let names = |finding: &Finding| {
-            let is_mover = finding.joint.is_some() && finding.joint.as_ref() == mover;
-            let is_there = finding.link.as_ref() == Some(&link.name) || is_mover;
-            is_there
-                && spec
-                    .parameters
-                    .keys()
-                    .all(|name| finding.parameters.contains_key(name))
-        };
-        if !findings.iter().any(names) {
-            return;
-        }
         self.before.insert(link.name.clone(), link.inertia);
         let own = self.bodies.entry(link.name.clone()).or_insert(link.inertia);
         *own += change;
     }
+}
+
+/// The link whose inertia a term changes, and the change.
+fn body_of(model: &Model, spec: &TermSpec) -> Option<(usize, Inertia)> {
+    spec.build(model).ok().and_then(|term| term.inertia())
+}
+
+/// Links of which a finding says that they are other bodies: by their name, or by that of their joint and a term's parameters.
+fn named_links(model: &Model, terms: &[TermSpec], findings: &[Finding]) -> BTreeSet<usize> {
+    let is_named = |spec: &TermSpec, link: usize| {
+        let link = &model.links()[link];
+        let mover = link.joint.map(|joint| &model.joints()[joint].name);
+        findings.iter().any(|finding| {
+            let is_mover = finding.joint.is_some() && finding.joint.as_ref() == mover;
+            let mut keys = spec.parameters.keys();
+            let is_there = finding.link.as_ref() == Some(&link.name) || is_mover;
+            is_there && keys.all(|name| finding.parameters.contains_key(name))
+        })
+    };
+    let of = |spec: &TermSpec| {
+        let (link, _) = body_of(model, spec)?;
+        is_named(spec, link).then_some(link)
+    };
+    terms.iter().filter_map(of).collect()
 }
 
 impl JointCorrections {
