@@ -8,13 +8,15 @@ use std::process::Command;
 use crate::common::python;
 use crate::common::{Out, hide_own_package, root, skipped};
 
-const PACKAGES: [&str; 6] = [
+const PACKAGES: [&str; 8] = [
     "maturin>=1.9,<2",
     "pytest",
     "pyarrow",
     "pandas",
     "nbclient",
     "ipykernel",
+    "mujoco==4.0.0",
+    "matplotlib",
 ];
 
 /// Builds the wheel into `folder` from what `cargo test --workspace` has built, and installs it.
@@ -51,7 +53,7 @@ fn install(python: &Path, folder: &Path) {
 
 #[test]
 fn the_wheel_reads_recordings_and_runs_commands() {
-    let modules = "maturin, pytest, pyarrow, pandas, nbclient, ipykernel";
+    let modules = "maturin, pytest, pyarrow, pandas, nbclient, ipykernel, mujoco, matplotlib";
     let python = match python::python("python-wheel", &PACKAGES, modules) {
         Ok(python) => python,
         Err(why) => {

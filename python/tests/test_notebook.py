@@ -14,4 +14,6 @@ def test_the_notebook_runs() -> None:
     shown = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     pages = [output for output in shown if "<iframe srcdoc=" in output.get("data", {}).get("text/html", "")]
     assert len(pages) == 1
+    pictures = [output for output in shown if "image/png" in output.get("data", {})]
+    assert len(pictures) == 1
     assert not [output for output in shown if output.output_type == "stream" and output.name == "stderr"]
