@@ -66,8 +66,10 @@ def told(program, model, folder, fit):
     done = subprocess.run([*arguments, str(model)], capture_output=True, text=True)
     if "Save what MuJoCo has computed" in done.stderr:
         saved = model.parent / f"saved_{folder.name}.xml"
-        m = mujoco.MjModel.from_xml_path(str(model))
-        mujoco.mj_saveLastXML(str(saved), m)
+        spec = mujoco.MjSpec.from_file(str(model))
+        spec.compiler.saveinertial = True
+        spec.compile()
+        spec.to_file(str(saved))
         return saved, subprocess.run([*arguments, str(saved)], capture_output=True, text=True)
     return model, done
 

@@ -228,6 +228,8 @@ pub struct Traits {
     pub is_fast: bool,
     /// A term of [`Layer::Record`] that only adds.
     pub only_adds: bool,
+    /// It is plain dry friction with the opposite sign.
+    pub negates_friction: bool,
     /// It only shifts effort or position in time.
     pub shifts_time: bool,
     /// It cuts the effort off at a limit, of a sensor or of a drive: a finding says of which.
@@ -264,6 +266,7 @@ impl Traits {
         needs_load: false,
         is_fast: false,
         only_adds: false,
+        negates_friction: false,
         shifts_time: false,
         cuts_off: false,
         is_scale: false,

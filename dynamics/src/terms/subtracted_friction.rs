@@ -31,6 +31,7 @@ pub(super) static EFFECT: Effect = Effect {
     concealed: Some(|draw| Drawn::new(draw.efforts_nm(), |f| vec![("subtracted_nm", f)])),
     traits: Traits {
         only_adds: true,
+        negates_friction: true,
         is_off_list: true,
         ..Traits::NONE
     },

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tauscope_dynamics::terms::{CoordinateKind, UNKNOWN};
+use tauscope_dynamics::terms::{COULOMB_FRICTION, CoordinateKind, UNKNOWN};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
@@ -105,7 +105,7 @@ impl Variant {
     }
 
     /// Whether one explanation cannot have both: laws nest, so a place has one of all laws that contain the same simplest
-    /// one; a joint's effort is late in one way; and a joint has one unknown law, since sums of several describe anything. Less of
+    /// one; what is missing is not subtracted, too; a joint's effort is late in one way; and a joint has one unknown law, since sums of several describe anything. Less of
     /// the friction that the robot's file states and another law of it can be true together: the one takes the other's place.
     pub fn excludes(&self, other: &Self) -> bool {
         let (own, others) = (self.hypothesis, other.hypothesis);
@@ -113,9 +113,9 @@ impl Variant {
             let (a, b) = (own.only_joint(), others.only_joint());
             return a.is_none() || b.is_none() || a == b;
         }
-        own.place == others.place
-            && simplest(own) == simplest(others)
-            && self.corrects_stated == other.corrects_stated
+        let nests =
+            simplest(own) == simplest(others) && self.corrects_stated == other.corrects_stated;
+        own.place == others.place && (nests || opposes(own, others) || opposes(others, own))
     }
 
     /// Indices of its columns: the offset, if it has one, and those of its factors.
@@ -127,6 +127,11 @@ impl Variant {
     pub fn columns(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.deviations.len()
     }
+}
+
+/// Whether the one is dry friction that is missing and the other dry friction that was subtracted: one effort with two names.
+fn opposes(one: Hypothesis, other: Hypothesis) -> bool {
+    one.effect.traits.negates_friction && *other.effect == COULOMB_FRICTION
 }
 
 /// The columns of a variant, unwhitened.

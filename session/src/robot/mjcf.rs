@@ -81,7 +81,8 @@ pub enum MjcfError {
 }
 
 /// The command that saves a compiled model.
-const SAVE: &str = "python3 -c \"import mujoco; m = mujoco.MjModel.from_xml_path('MODEL.xml'); mujoco.mj_saveLastXML('SAVED.xml', m)\"";
+const SAVE: &str = "python3 -c \"import mujoco; s = mujoco.MjSpec.from_file('MODEL.xml'); s.compiler.saveinertial = True; s.compile(); \
+                    s.to_file('SAVED.xml')\"";
 
 /// The URDF of the model in `xml`, whose file is at `path`, and remarks on what a URDF cannot say.
 ///
