@@ -15,7 +15,14 @@ pub fn simplest(objective: &Objective<'_>, mut set: Set) -> Set {
                 let simpler = own.effect.simpler.map(|simpler| simpler.effect);
                 other.place == own.place && simpler == Some(other.effect)
             };
-            let simpler = (0..objective.variants.len()).filter(is_simpler);
+            // Next to a correction of stated friction the simpler law would be that correction twice.
+            let joins = {
+                let less = less.clone();
+                move |w: &usize| objective.fits(&less, *w)
+            };
+            let simpler = (0..objective.variants.len())
+                .filter(is_simpler)
+                .filter(joins);
             simpler.map(move |w| {
                 let mut swapped = less.clone();
                 swapped.insert(swapped.partition_point(|x| *x < w), w);

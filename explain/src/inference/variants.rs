@@ -367,7 +367,9 @@ fn given(
             positive: positive.collect(),
             log_prior,
             is_forced,
-            corrects_stated: problem.states_friction && stated.is_some_and(|known| *known > 0.0),
+            corrects_stated: problem.states_friction
+                && hypothesis.effect.is_plain_friction()
+                && stated.is_some_and(|known| *known > 0.0),
             curve: None,
         },
         alone,
