@@ -1,4 +1,4 @@
-//! What is written into a simulator's model, in the simulators themselves: the short form of `tests/simulators/prove.py`.
+//! Written models in the simulators themselves: the short form of `tests/simulators/prove.py`.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::process::Command;

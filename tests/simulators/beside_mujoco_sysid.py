@@ -3,8 +3,8 @@
     python3 tests/simulators/beside_mujoco_sysid.py OUT [--cases arm7,folded]
 
 Needs requirements.txt, and OUT as prove.py left it. mujoco.sysid fits rollouts of a quarter of a second under the recorded efforts, from the
-recorded states, to the recorded positions and velocities by Gauss-Newton. It is told which three parameters are concealed, and then all
-candidates: damping, frictionloss, armature and stiffness of all joints, and the masses of all bodies. `explain` is told nothing.
+recorded states, to the recorded positions and velocities by Gauss-Newton. Its parameter list holds the three that are concealed, and then all
+candidates: damping, frictionloss, armature and stiffness of all joints, and the masses of all bodies. `explain` has no such list.
 """
 import argparse
 import json
@@ -112,7 +112,7 @@ def main():
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--cases", default=",".join(prove.CASES))
     args = parser.parse_args()
-    print("| case | concealed | explain, told nothing | mujoco.sysid, told which three | mujoco.sysid, told all candidates | seconds, of the three |")
+    print("| case | concealed | explain, nothing given | mujoco.sysid, the three given | mujoco.sysid, all candidates given | seconds, of the three |")
     print("| --- | --- | --- | --- | --- | --- |")
     for name in args.cases.split(","):
         folder, (model, changes) = args.out / name, prove.CASES[name]

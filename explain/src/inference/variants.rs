@@ -295,15 +295,8 @@ pub fn at(
     sizes: &[Magnitude],
 ) -> Option<Given> {
     let columns = fit.columns(problem, hypothesis, &shape);
-    let alone = columns.alone.clone();
-    let given = given(
-        problem,
-        hypothesis,
-        shape,
-        (alone, columns.factors.clone()),
-        count,
-        sizes,
-    );
+    let own = (columns.alone.clone(), columns.factors.clone());
+    let given = given(problem, hypothesis, shape, own, count, sizes);
     (!given.is_silent).then_some(given)
 }
 

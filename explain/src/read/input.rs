@@ -46,8 +46,7 @@ impl Input {
         self.fit.len() == 1 && self.holdout.is_empty() && self.found_before().is_none()
     }
 
-    /// Holds out some of the recordings to fit: a quarter, of middle travel. Of a single recording its end: motion goes on where
-    /// nothing was fitted.
+    /// Holds out a quarter of the recordings to fit, those of middle travel; the end of a single recording.
     pub fn hold_out_some(&mut self) {
         if self.is_parted()
             && let Some(only) = self.fit.pop()

@@ -126,6 +126,11 @@ pub fn of(
         let (active, deviations) = pushes::joined(problem, fit, &inferred.covariance, &parts);
         let active = &active;
         let less = fit.without(problem, &parts);
+        let size = effort_rms(&less, fit, unit_nm);
+        // A mass that its bound holds at zero is no finding.
+        if size == 0.0 {
+            continue;
+        }
         let (mut parameters, mut intervals) = numbers(problem, fit, active, &deviations, joints);
         let (joint, link) = place_of(input, joints, &active.hypothesis);
         let place = link.clone().or_else(|| joint.clone()).unwrap_or_default();
@@ -155,7 +160,7 @@ pub fn of(
             t_end: when.end,
             explains: share(&less),
             evidence_nats: margin,
-            effort_rms: effort_rms(&less, fit, unit_nm),
+            effort_rms: size,
             equivalent_to,
             sentence,
         });
