@@ -7,19 +7,20 @@ use super::{
 };
 
 /// Least and largest speed at which the friction is full \[rad/s\].
-/// Physical: `MuJoCo` has about F/(945 M), with the inertia M that the joint moves: 0.005 at a shoulder, 0.5 at a wrist without rotor.
+/// Physical: with `MuJoCo`'s default `solref` and `solimp` about F/(947 M) in steady motion, where M is the inertia that the joint
+/// moves: 0.005 at a shoulder, 0.5 at a light wrist, and a margin.
 const SPEEDS_RAD_S: [f64; 2] = [0.005, 2.0];
 
-/// Effort Fc max(-1, min(1, qd/v0)): Coulomb friction with a linear transition (Olsson, Åström, Canudas de Wit, Gäfvert and
-/// Lischinsky, "Friction Models and Friction Compensation", *European Journal of Control* 4, 1998, section 2). Simulators
-/// compute dry friction so: `MuJoCo`'s constraint of `frictionloss` is soft.
+/// Effort Fc max(-1, min(1, qd/v0)): Coulomb friction with a linear transition (Andersson, Söderberg and Björklund, "Friction models
+/// for sliding dry, boundary and mixed lubricated contacts", *Tribology International* 40, 2007). Nearest to `MuJoCo`'s
+/// `frictionloss`, a soft constraint: about -9 M (qdd + 105 qd) until it is full.
 pub(super) static EFFECT: Effect = Effect {
     name: "creeping_friction",
     words: Words::new(
         "Creeping friction",
         "creeping friction",
         "Dry friction that grows with the speed until it is full: the joint creeps in place of standing still.",
-        "Joint {place}: were the recordings simulated? Simulators compute dry friction so.",
+        "Joint {place}: were the recordings simulated? MuJoCo computes dry friction so.",
         "Joint {place} has dry friction of {coulomb_nm} that is full from {full_velocity_rad_s} on and that the twin leaves out.",
     ),
     family: Family::Friction,

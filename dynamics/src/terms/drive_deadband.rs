@@ -43,7 +43,7 @@ pub(super) static EFFECT: Effect = Effect {
     simpler: None,
     excitation: Excitation::Poses,
     exported: super::Exported::No(
-        "no simulator has a drive that answers small commands with nothing",
+        "no attribute has a drive that answers small commands with nothing",
     ),
     simulated: Simulated::Record,
     concealed: Some(|draw| {

@@ -37,7 +37,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: wave::to_coordinates,
     simpler: None,
     excitation: Excitation::Speeds,
-    exported: super::Exported::No("no simulator has friction that depends on the angle"),
+    exported: super::Exported::No("no attribute has friction that depends on the angle"),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let cycles = f64::from(draw.chance.whole(1, 8));

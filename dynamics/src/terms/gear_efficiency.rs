@@ -39,7 +39,9 @@ pub(super) static EFFECT: Effect = Effect {
         numbers: &["driving_coefficient", "backdriving_coefficient"],
     }),
     excitation: Excitation::Speeds,
-    exported: super::Exported::No("no simulator has friction that grows with the load"),
+    exported: super::Exported::No(
+        "no attribute of these targets has friction that grows with the load",
+    ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let (mut drives, mut driven) = (1.0, 0.2 + 0.3 * draw.share);

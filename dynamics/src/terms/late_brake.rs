@@ -35,7 +35,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Speeds,
-    exported: super::Exported::No("no simulator has a brake that drags on after it was released"),
+    exported: super::Exported::No("no attribute has a brake that drags on after it was released"),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let release = draw.chance.between(0.15, 0.6);

@@ -26,7 +26,9 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Speeds,
-    exported: super::Exported::No("no simulator has friction that grows with the load"),
+    exported: super::Exported::No(
+        "no attribute of these targets has friction that grows with the load",
+    ),
     simulated: Simulated::Joint,
     concealed: Some(|_| Drawn::new([1e-4, 0.5], |c| vec![("coefficient", c)])),
     traits: Traits {

@@ -28,7 +28,9 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Speeds,
-    exported: super::Exported::No("no simulator has friction that grows with the load"),
+    exported: super::Exported::No(
+        "no attribute of these targets has friction that grows with the load",
+    ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let largest = draw.largest_nm.max(1e-3);

@@ -43,7 +43,7 @@ pub(super) static EFFECT: Effect = Effect {
     excitation: Excitation::Speeds,
     exported: super::Exported::Nearest(
         |p| vec![super::Quantity::DryFriction(p[0])],
-        "the dry friction is written; simulators have springs of their own before a joint slips",
+        "the dry friction is written; a simulator lets the joint creep or holds it, and does not give like a spring",
     ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

@@ -27,7 +27,7 @@ pub(super) static EFFECT: Effect = Effect {
     simpler: None,
     excitation: Excitation::Speeds,
     exported: super::Exported::No(
-        "no simulator has friction that grows with the square of the speed; fit viscous friction instead: --without quadratic_drag",
+        "no attribute is written for drag that grows with the square of the speed; fit viscous friction instead: --without quadratic_drag",
     ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

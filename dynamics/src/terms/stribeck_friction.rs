@@ -57,7 +57,7 @@ pub(super) static EFFECT: Effect = Effect {
                 super::Quantity::StaticFriction(p[1]),
             ]
         },
-        "friction in motion is written, and friction at rest where the simulator knows it; no simulator has the fall in between",
+        "friction in motion is written, and friction at rest where the target has it; the fall in between has no attribute",
     ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

@@ -31,7 +31,9 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Speeds,
-    exported: super::Exported::No("it is a curve without a law; no simulator has one"),
+    exported: super::Exported::No(
+        "a curve without a law has no attribute; where an `unknown` is another body, the body is written",
+    ),
     simulated: Simulated::Joint,
     concealed: None,
     traits: Traits {

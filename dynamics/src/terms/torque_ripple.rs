@@ -43,7 +43,7 @@ pub(super) static EFFECT: Effect = Effect {
     simpler: None,
     excitation: Excitation::WholeRange,
     exported: super::Exported::No(
-        "no simulator has a torque that ripples with the angle; it hardly moves an arm",
+        "no attribute is written for a torque that ripples with the angle; it hardly moves an arm",
     ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

@@ -178,14 +178,9 @@ fn leave_out_unmeasured(counts: &mut [bool], recording: &Recording, joint: usize
 
 /// Distance of neighbouring positions in the middle of a joint's range: half of the range is covered more finely.
 fn middle_gap(tracks: &[FitTrack], joint: usize, n: usize) -> f64 {
-    let own = |track: &FitTrack| {
-        track
-            .track
-            .position
-            .clone()
-            .into_iter()
-            .skip(joint)
-            .step_by(n)
+    let own = |track: &FitTrack| -> Vec<f64> {
+        let all = &track.track.position;
+        all.iter().skip(joint).step_by(n).copied().collect()
     };
     let mut positions: Vec<f64> = tracks.iter().flat_map(own).collect();
     positions.sort_by(f64::total_cmp);

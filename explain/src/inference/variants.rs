@@ -104,9 +104,9 @@ impl Variant {
         all
     }
 
-    /// Whether one explanation cannot have both: laws nest, so a place has one of all laws that contain the same simplest
-    /// one; what is missing is not subtracted, too; a joint's effort is late in one way; and a joint has one unknown law, since sums of several describe anything. Less of
-    /// the friction that the robot's file states and another law of it can be true together: the one takes the other's place.
+    /// Whether one explanation cannot have both. Laws nest, so a place has one of all laws that contain the same simplest one; but
+    /// less of the friction that the robot's file states, and another law in its place, can be true together. What is missing is
+    /// not subtracted, too. A joint's effort is late in one way. A joint has one unknown law: sums of several describe anything.
     pub fn excludes(&self, other: &Self) -> bool {
         let (own, others) = (self.hypothesis, other.hypothesis);
         if own.is_of_timing() && others.is_of_timing() {

@@ -2,7 +2,7 @@
 
 use tauscope_session::by_recording;
 
-use crate::read::input::Input;
+use crate::read::input::{FOR_ONE_HELD_OUT, Input};
 use crate::read::recording::Recording;
 
 /// A joint moves if it does so further than this in some recording: a push bends even an arm that holds still
@@ -38,9 +38,11 @@ pub fn before(input: &Input) -> Option<String> {
             recording.duration_s()
         ));
     }
-    // Of a single recording the last quarter is held out, which must be long enough, too.
-    let is_short =
-        |r: &Recording| r.len() < 4 * LEAST_SAMPLES || r.duration_s() < 4.0 * LEAST_DURATION_S;
+    // The held-out part of a single recording must be long enough, too.
+    let is_short = |r: &Recording| {
+        let part = 1.0 / FOR_ONE_HELD_OUT as f64;
+        r.len() < FOR_ONE_HELD_OUT * LEAST_SAMPLES || part * r.duration_s() < LEAST_DURATION_S
+    };
     if input.is_parted() && !at_rest(input) && input.fit.iter().any(is_short) {
         return Some(
             "there is only one recording, and it is too short for a part of it to be held out. Record the same arm once more, \

@@ -31,7 +31,7 @@ pub struct Input {
 }
 
 /// Recordings for each one that is held out. Chosen: most of the data is fitted.
-const FOR_ONE_HELD_OUT: usize = 4;
+pub const FOR_ONE_HELD_OUT: usize = 4;
 /// Appended to the name of a single recording's held-out end.
 const LAST_PART: &str = "_last_quarter";
 
@@ -110,7 +110,7 @@ mod tests {
         let rows = begin.sample_of_row.iter().zip(&end.sample_of_row);
         assert!(rows.clone().all(|(a, b)| a.is_some() != b.is_some()));
         assert_eq!(end.sample_of_row.last(), Some(&Some(end.len() - 1)));
-        assert_eq!(end.position[0], whole.position[begin.position.len()]);
+        assert_eq!(end.position, whole.position[begin.position.len()..].to_vec());
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub struct Corrections {
     pub gravity: Option<[f64; 3]>,
     /// Inertia of links before, for the reader of a file.
     pub before: BTreeMap<String, Inertia>,
-    /// Effects that no simulator says or says only nearly, and why.
+    /// Effects that are not written, or only approximated, and why.
     pub lost: Vec<String>,
 }
 
@@ -69,7 +69,15 @@ impl Corrections {
             };
             for quantity in quantities {
                 match quantity {
-                    Quantity::Body => all.add_body(model, spec, &named),
+                    Quantity::Body => match spec.build(model) {
+                        Ok(_) => all.add_body(model, spec, &named),
+                        // MuJoCo fuses links without joints when it reads a URDF.
+                        Err(why) if names_link(findings, spec) => {
+                            let lost = format!("{}{place} is not written: {why}", effect.name);
+                            all.lost.push(lost);
+                        }
+                        Err(_) => {}
+                    },
                     Quantity::Gravity => {
                         if let Ok(term) = spec.build(model) {
                             term.alter(&mut turned);
@@ -124,7 +132,12 @@ fn body_of(model: &Model, spec: &TermSpec) -> Option<(usize, Inertia)> {
     spec.build(model).ok().and_then(|term| term.inertia())
 }
 
-/// Links of which a finding says that they are other bodies: by their name, or by that of their joint and a term's parameters.
+/// Whether a finding is about the link of a term.
+fn names_link(findings: &[Finding], spec: &TermSpec) -> bool {
+    spec.link.is_some() && findings.iter().any(|finding| finding.link == spec.link)
+}
+
+/// Links whose mass or inertia a finding corrects: it names the link, or the link's joint and the parameters of a term.
 fn named_links(model: &Model, terms: &[TermSpec], findings: &[Finding]) -> BTreeSet<usize> {
     let is_named = |spec: &TermSpec, link: usize| {
         let link = &model.links()[link];

@@ -222,3 +222,13 @@ fn a_file_of_another_kind_and_a_body_that_is_none_are_refused() {
     let error = write(Target::Sdf, "<sdf/>", ROBOT, &corrections(OF_JOINT)).unwrap_err();
     assert!(error.to_string().contains("no joint `turn`"), "{error}");
 }
+
+/// Guards against silence: MuJoCo fuses links without joints, so that a model may lack the link that a finding names.
+#[test]
+fn a_body_that_the_model_lacks_is_listed() {
+    let all = corrections(
+        r#"[{"effect": "link_mass", "link": "flange", "parameters": {"delta_mass_kg": 0.5}}]"#,
+    );
+    assert!(all.bodies.is_empty());
+    assert!(all.lost[0].contains("flange"), "{:?}", all.lost);
+}

@@ -33,11 +33,11 @@ const GRAVITY_M_S2: f64 = 9.81;
 const GRAVITY_SHARE: f64 = 0.01;
 /// Smallest turn of gravity that counts \[rad\]. Resolution: of seven digits in a file.
 const LEAST_TURN_RAD: f64 = 1e-6;
-/// Limit of effort and velocity of a joint that has none. Interface: readers of URDF ask for both and refuse `inf`.
+/// Limit of effort, velocity and slide of a joint that has none. Interface: this project's reader takes `inf`, others do not.
 const NO_LIMIT: &str = "1e9";
 /// Name of the root link: readers of URDF take a link of this name for their fixed world.
 const WORLD: &str = "world";
-/// Name of the link of MuJoCo's world where gravity does not point down in it.
+/// Name of the link of MuJoCo's world frame, where its gravity is not along -z.
 const TURNED_WORLD: &str = "turned_world";
 
 /// Why a MuJoCo model cannot be used.
@@ -116,10 +116,24 @@ pub fn to_urdf(xml: &str, path: &Path) -> Result<(String, Vec<String>), MjcfErro
 
 /// A URDF of [`to_urdf`] without what only a MuJoCo model states.
 pub fn without_mujoco(urdf: &str) -> String {
+    let (mut text, mut slides) = (String::new(), false);
     // Each of these elements is a line of its own.
-    let is_kept = |line: &&str| !line.trim_start().starts_with("<mujoco:");
-    let lines: Vec<&str> = urdf.lines().filter(is_kept).collect();
-    let text = lines.join("\n") + "\n";
+    for line in urdf.lines() {
+        if line.trim_start().starts_with("<mujoco:") {
+            continue;
+        }
+        if line.contains("<joint ") {
+            slides = line.contains("type=\"prismatic\"");
+        }
+        let is_limit = line.trim_start().starts_with("<limit ");
+        if slides && is_limit && !line.contains("lower=") {
+            // Without limits other readers lock a slide at zero.
+            let head = line.trim_end_matches("/>");
+            let _ = writeln!(text, "{head} lower=\"-{NO_LIMIT}\" upper=\"{NO_LIMIT}\"/>");
+        } else {
+            let _ = writeln!(text, "{line}");
+        }
+    }
     text.replace(&format!(" xmlns:mujoco=\"{MUJOCO}\""), "")
         .replace("=\"inf\"", &format!("=\"{NO_LIMIT}\""))
 }
