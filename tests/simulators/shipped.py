@@ -23,7 +23,7 @@ import prove
 PACKAGES = ("robosuite==1.5.2", "gymnasium-robotics==1.4.2", "dm_control==1.0.50")
 MODELS = {
     **{name: f"robosuite/models/assets/robots/{name}/robot.xml" for name in (
-        "baxter", "iiwa", "jaco", "kinova3", "panda", "sawyer", "spot_arm", "tiago", "ur5e", "xarm7")},
+        "baxter", "iiwa", "jaco", "kinova3", "panda", "sawyer", "tiago", "ur5e", "xarm7")},
     "inspire_hand": "robosuite/models/assets/grippers/inspire_right_hand.xml",
     "jaco_arm": "dm_control/third_party/kinova/jaco_arm.xml",
     "reacher": "dm_control/suite/reacher.xml",
