@@ -110,7 +110,10 @@ mod tests {
         let rows = begin.sample_of_row.iter().zip(&end.sample_of_row);
         assert!(rows.clone().all(|(a, b)| a.is_some() != b.is_some()));
         assert_eq!(end.sample_of_row.last(), Some(&Some(end.len() - 1)));
-        assert_eq!(end.position, whole.position[begin.position.len()..].to_vec());
+        assert_eq!(
+            end.position,
+            whole.position[begin.position.len()..].to_vec()
+        );
     }
 
     #[test]
