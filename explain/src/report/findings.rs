@@ -127,8 +127,8 @@ pub fn of(
         let active = &active;
         let less = fit.without(problem, &parts);
         let size = effort_rms(&less, fit, unit_nm);
-        // A mass that its bound holds at zero is no finding.
-        if size == 0.0 {
+        // A mass that its bound holds at zero is no finding; a push without a known force is one.
+        if size == 0.0 && active.hypothesis.time_kind() == TimeKind::Always {
             continue;
         }
         let (mut parameters, mut intervals) = numbers(problem, fit, active, &deviations, joints);
