@@ -31,9 +31,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
     excitation: Excitation::Speeds,
-    exported: super::Exported::No(
-        "a curve without a law has no attribute; where an `unknown` is another body, the body is written",
-    ),
+    exported: super::Exported::No("a curve has no attribute; an unknown body is written"),
     simulated: Simulated::Joint,
     concealed: None,
     traits: Traits {
