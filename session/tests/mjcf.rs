@@ -142,3 +142,31 @@ fn a_mesh_that_stands_still_needs_no_mass() {
         <inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></body></worldbody></mujoco>"#;
     assert_eq!(read(text).unwrap().model.dof(), 1);
 }
+
+/// Guards against locked slides: other readers take a slide without limits for one that stands at zero, and refuse `inf`.
+#[test]
+fn a_urdf_for_other_readers_has_finite_limits_and_no_elements_of_mujoco() {
+    let slide = r#"<mujoco><option gravity="0 0 9.81"/><worldbody><body name="cart"><joint name="rail" type="slide" axis="1 0 0"/>
+        <inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/></body></worldbody></mujoco>"#;
+    let robot = read(slide).unwrap();
+    let (urdf, model) = robot::plain_urdf(&robot.urdf).unwrap();
+    assert!(!urdf.contains("mujoco") && !urdf.contains("inf"), "{urdf}");
+    assert!(urdf.contains("lower=\"-1e9\" upper=\"1e9\""), "{urdf}");
+    // The root is a world that stands, though gravity is turned in MuJoCo's.
+    assert!(urdf.contains("<parent link=\"world\"/>"), "{urdf}");
+    assert_eq!(model.dof(), 1);
+}
+
+#[test]
+fn a_moving_body_without_mass_is_refused_but_one_whose_fixed_child_has_a_mass_is_not() {
+    let arm = |inner: &str| {
+        format!(
+            r#"<mujoco><worldbody><body name="arm"><joint name="turn" axis="0 1 0"/>{inner}</body></worldbody></mujoco>"#
+        )
+    };
+    let error = read(&arm("")).unwrap_err();
+    assert!(error.contains("mass of body `arm`, which moves"), "{error}");
+    let carried =
+        r#"<body name="lump"><inertial mass="1" pos="0 0 0.1" diaginertia="1 1 1"/></body>"#;
+    assert!(read(&arm(carried)).is_ok());
+}

@@ -136,7 +136,7 @@ impl Problem {
             variances[j].sort_by(f64::total_cmp);
             let variance = variances[j][variances[j].len() / 2];
             problem.white_noise[j] = deviation(variance, problem.largest_effort[j]);
-            problem.position_gaps[j] = middle_gap(&problem.tracks, j, n);
+            problem.position_gaps[j] = middle_gap(positions(&problem.tracks, j, n));
         }
         problem
     }
@@ -176,13 +176,16 @@ fn leave_out_unmeasured(counts: &mut [bool], recording: &Recording, joint: usize
     }
 }
 
+/// The positions of a joint in all recordings.
+fn positions(tracks: &[FitTrack], joint: usize, n: usize) -> Vec<f64> {
+    let all = tracks
+        .iter()
+        .flat_map(|track| track.track.position.chunks_exact(n));
+    all.map(|row| row[joint]).collect()
+}
+
 /// Distance of neighbouring positions in the middle of a joint's range: half of the range is covered more finely.
-fn middle_gap(tracks: &[FitTrack], joint: usize, n: usize) -> f64 {
-    let own = |track: &FitTrack| -> Vec<f64> {
-        let all = &track.track.position;
-        all.iter().skip(joint).step_by(n).copied().collect()
-    };
-    let mut positions: Vec<f64> = tracks.iter().flat_map(own).collect();
+fn middle_gap(mut positions: Vec<f64>) -> f64 {
     positions.sort_by(f64::total_cmp);
     let mut gaps: Vec<f64> = positions.windows(2).map(|pair| pair[1] - pair[0]).collect();
     gaps.sort_by(|a, b| b.total_cmp(a));
@@ -205,6 +208,15 @@ mod tests {
     use tauscope_dynamics::{Data, gravity_effort};
 
     use crate::fixture::{model, problem, recording};
+
+    #[test]
+    fn the_gap_of_a_motion_is_small_and_that_of_poses_is_their_distance() {
+        let motion = (0..1000).map(|k| (0.01 * f64::from(k)).sin()).collect();
+        assert!(super::middle_gap(motion) < 0.005);
+        let poses = (0..200).map(|k| 0.2 * f64::from(k % 10) + 1e-5 * f64::from(k));
+        let gap = super::middle_gap(poses.collect());
+        assert!((gap - 0.2).abs() < 0.01, "{gap}");
+    }
 
     /// A log of one row a pose, whose time counts the rows: the effort of a pose is compared with the gravity at that pose.
     #[test]
