@@ -146,7 +146,7 @@ fn a_mesh_that_stands_still_needs_no_mass() {
 /// Guards against locked slides: other readers take a slide without limits for one that stands at zero, and refuse `inf`.
 #[test]
 fn a_urdf_for_other_readers_has_finite_limits_and_no_elements_of_mujoco() {
-    let slide = r#"<mujoco><option gravity="0 0 9.81"/><worldbody><body name="cart"><joint name="rail" type="slide" axis="1 0 0"/>
+    let slide = r#"<mujoco><option gravity="0 0 9.81"/><worldbody><body name="cart"><joint name="rail" type="slide" axis="1 0 0"/><joint name="turn"/>
         <inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/></body></worldbody></mujoco>"#;
     let robot = read(slide).unwrap();
     let (urdf, model) = robot::plain_urdf(&robot.urdf).unwrap();
@@ -154,7 +154,9 @@ fn a_urdf_for_other_readers_has_finite_limits_and_no_elements_of_mujoco() {
     assert!(urdf.contains("lower=\"-1e9\" upper=\"1e9\""), "{urdf}");
     // The root is a world that stands, though gravity is turned in MuJoCo's.
     assert!(urdf.contains("<parent link=\"world\"/>"), "{urdf}");
-    assert_eq!(model.dof(), 1);
+    // The link between the two joints has a mass that changes nothing.
+    assert!(urdf.contains("<mass value=\"1e-9\"/>"), "{urdf}");
+    assert_eq!(model.dof(), 2);
 }
 
 #[test]

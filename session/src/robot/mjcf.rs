@@ -9,6 +9,7 @@ mod bodies;
 mod equalities;
 mod includes;
 mod names;
+mod plain;
 mod text;
 
 use std::collections::BTreeMap;
@@ -25,6 +26,7 @@ use bodies::{NoInertia, inertia, shapes};
 use includes::folder_of;
 pub use includes::whole;
 use names::Names;
+pub use plain::without_mujoco;
 use text::{escaped, isometry, origin};
 
 /// Gravity that every twin computes with \[m/s²\]. Physical: simulators use 9.81 instead of the standard 9.80665.
@@ -33,8 +35,6 @@ const GRAVITY_M_S2: f64 = 9.81;
 const GRAVITY_SHARE: f64 = 0.01;
 /// Smallest turn of gravity that counts \[rad\]. Resolution: of seven digits in a file.
 const LEAST_TURN_RAD: f64 = 1e-6;
-/// Limit of effort, velocity and slide of a joint that has none. Interface: this project's reader takes `inf`, others do not.
-const NO_LIMIT: &str = "1e9";
 /// Name of the root link: readers of URDF take a link of this name for their fixed world.
 const WORLD: &str = "world";
 /// Name of the link of MuJoCo's world frame, where its gravity is not along -z.
@@ -112,30 +112,6 @@ pub fn to_urdf(xml: &str, path: &Path) -> Result<(String, Vec<String>), MjcfErro
     };
     writer.robot()?;
     Ok((writer.text, writer.remarks))
-}
-
-/// A URDF of [`to_urdf`] without what only a MuJoCo model states.
-pub fn without_mujoco(urdf: &str) -> String {
-    let (mut text, mut slides) = (String::new(), false);
-    // Each of these elements is a line of its own.
-    for line in urdf.lines() {
-        if line.trim_start().starts_with("<mujoco:") {
-            continue;
-        }
-        if line.contains("<joint ") {
-            slides = line.contains("type=\"prismatic\"");
-        }
-        let is_limit = line.trim_start().starts_with("<limit ");
-        if slides && is_limit && !line.contains("lower=") {
-            // Without limits other readers lock a slide at zero.
-            let head = line.trim_end_matches("/>");
-            let _ = writeln!(text, "{head} lower=\"-{NO_LIMIT}\" upper=\"{NO_LIMIT}\"/>");
-        } else {
-            let _ = writeln!(text, "{line}");
-        }
-    }
-    text.replace(&format!(" xmlns:mujoco=\"{MUJOCO}\""), "")
-        .replace("=\"inf\"", &format!("=\"{NO_LIMIT}\""))
 }
 
 struct Writer<'a> {
