@@ -1,5 +1,5 @@
 //! Written models in the simulators themselves: the short form of `tests/simulators/prove.py`.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::process::Command;
 

@@ -1,13 +1,9 @@
 """Inverse dynamics of written URDFs by Pinocchio and by Drake. What their formats lack is added, as docs/simulators.md lists it."""
-import logging
-
 import numpy as np
 import pinocchio
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
-
-logging.getLogger("drake").setLevel(logging.ERROR)
 
 
 def springs(m, position):
