@@ -1,9 +1,9 @@
-//! What a sample costs on its way through twin and detector, beside its floor: the inverse dynamics
-//! alone. And what a replay costs beside a bare read of the same archive.
+//! Computing time of a sample in twin and detector, compared with its floor, the inverse dynamics alone. Also the
+//! time of a replay's source, compared with a bare read of the same archive.
 //!
 //!     cargo bench --bench chain
 //!
-//! Percentiles, because the mean says little where the machine has other things to do.
+//! Percentiles are given, because the mean is not informative on a machine that runs other programs.
 
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -17,10 +17,10 @@ use tauscope_bus::{
 use tauscope_dynamics::{Data, Model, rnea};
 use tauscope_ingest::{Config, FileConfig, RecordedSource, Setup, Topics};
 
-/// How often the recording is gone through.
+/// Number of passes over the recording.
 const ROUNDS: usize = 20;
 
-/// Takes samples and forgets all but the newest.
+/// Receives samples and keeps only the newest.
 #[derive(Default)]
 struct Slot<T>(T);
 
@@ -32,7 +32,7 @@ impl<T: Sample> Emit<T> for Slot<T> {
     }
 }
 
-/// Keeps all samples.
+/// Receives and keeps all samples.
 #[derive(Default)]
 struct Kept(Vec<JointState>);
 
@@ -170,7 +170,7 @@ fn main() {
     whole_recording(&joint_names);
 }
 
-/// A replay's source beside a bare read of the same archive.
+/// Times a replay's source and a bare read of the same archive.
 fn whole_recording(joint_names: &[String]) {
     let (mut bare, mut chain) = (histogram(), histogram());
     for _ in 0..ROUNDS {

@@ -1,12 +1,13 @@
-//! From ingest to alarm in a running pipeline at 1 kHz, beside as many hops of bare iceoryx2, both in this run and in
-//! turn.
+//! Latency from ingest to alarm in a running pipeline at 1 kHz, compared with the same number of hops of bare
+//! iceoryx2, both in this run and alternately.
 //!
 //!     cargo bench --bench live --profile release [-- SECONDS]
 //!
-//! `tauscope run` plays a recording in real time. A stage of this program takes each sample, as a source does that the
-//! robot has just told something, and writes the time into it. The twin and the detector do their work. A second stage
-//! of this program hears the detector and keeps the newest, as a publisher does, and takes the time again. The floor
-//! sends the largest of these samples over as many hops through as many processes, and does nothing else.
+//! `tauscope run` plays a recording in real time. A stage of this program receives each sample, as a source receives
+//! the robot's messages, and writes the time into it. The twin and the detector process it. A second stage of this
+//! program reads the detector's output with `keep: newest`, as a publisher does, and reads the clock again. The floor
+//! sends the largest of these samples over the same number of hops through the same number of processes, without
+//! processing them.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -25,11 +26,11 @@ mod recording;
 
 use bare::{BareReceiver, BareSender};
 
-/// In so many turns each chain is measured, so that all see the same machine.
+/// Number of turns in which each chain is measured, so that all chains see the same machine load.
 const TURNS: usize = 5;
-/// Samples at the beginning of a turn that do not count: processes start, caches fill.
+/// Number of samples at the beginning of a turn that are not counted: processes start, caches fill.
 const WARM_UP: usize = 2_000;
-/// Of the floor's time.
+/// Largest latency relative to the floor.
 const GOAL: f64 = 1.2;
 
 /// A pipeline whose latency is measured.
@@ -37,10 +38,10 @@ struct Shape {
     name: &'static str,
     /// Connections between processes from the first stamp to the second.
     hops: usize,
-    /// What the twin and the detector say about their processes.
+    /// Keys of the twin and the detector for their processes.
     twin: &'static str,
     detect: &'static str,
-    /// How the first of them learns that a sample is there.
+    /// Wake mode of the first of them.
     wake: &'static str,
     recorder: bool,
 }
@@ -55,7 +56,7 @@ const SHAPES: [Shape; 5] = [
         recorder: false,
     },
     Shape {
-        name: "the same, with a recorder beside",
+        name: "the same, with a recorder",
         hops: 2,
         twin: "chain",
         detect: "chain",
@@ -63,7 +64,7 @@ const SHAPES: [Shape; 5] = [
         recorder: true,
     },
     Shape {
-        name: "the same without a recorder, looking all the time",
+        name: "the same without a recorder, polling continuously",
         hops: 2,
         twin: "chain",
         detect: "chain",
@@ -79,7 +80,7 @@ const SHAPES: [Shape; 5] = [
         recorder: false,
     },
     Shape {
-        name: "the same, with a recorder beside",
+        name: "the same, with a recorder",
         hops: 3,
         twin: "twin",
         detect: "detect",
@@ -168,7 +169,7 @@ fn now_ns() -> i64 {
     now.expect("a time after 1970").as_nanos() as i64
 }
 
-/// Gives each sample the time at which it came.
+/// Writes the time of arrival into each sample.
 struct Stamp;
 
 impl Stage<JointState, JointState> for Stamp {
@@ -185,7 +186,7 @@ impl Stage<JointState, JointState> for Stamp {
     }
 }
 
-/// Takes the time at which each detection comes.
+/// Records the time of arrival of each detection.
 struct Arrivals {
     latencies_ns: Vec<u64>,
     file: PathBuf,
@@ -224,7 +225,7 @@ fn read(file: &Path) -> Vec<u64> {
     numbers.collect()
 }
 
-/// Runs the pipeline once and gives the latency of each sample \[ns\].
+/// Runs the pipeline once and returns the latency of each sample \[ns\].
 fn pipeline(folder: &Path, recording: &Path, shape: &Shape) -> Vec<u64> {
     let me = std::env::current_exe().expect("this program");
     let arrivals = folder.join("arrivals");
@@ -264,8 +265,9 @@ fn pipeline(folder: &Path, recording: &Path, shape: &Shape) -> Vec<u64> {
     read(&arrivals)
 }
 
-/// As many processes as the pipeline has, which hand a sample on and nothing else: one that sends a thousand samples a
-/// second, one that writes the time into them, `hops - 1` in between, and this one, which takes the time again.
+/// Measures a chain of the same number of processes as the pipeline, which only pass a sample on: one sends a
+/// thousand samples per second, one writes the time into them, `hops - 1` are in between, and this one reads the
+/// clock again.
 fn bare_chain(hops: usize, seconds: u32) -> Vec<u64> {
     let domain = Domain::unique();
     let place = domain.as_str();
@@ -289,7 +291,7 @@ fn bare_chain(hops: usize, seconds: u32) -> Vec<u64> {
             for number in 0..=samples {
                 let due = begin + Duration::from_millis(number as u64);
                 std::thread::sleep(due.saturating_duration_since(Instant::now()));
-                // The last one ends the chain.
+                // The last sample ends the chain.
                 let stamp_ns = if number == samples { -1 } else { number as i64 };
                 first.send(|sample| sample.header.stamp_ns = stamp_ns);
             }
@@ -317,7 +319,7 @@ fn other(arguments: &[&str]) -> Child {
         .expect("this program")
 }
 
-/// Hands on what comes, with the time if it is to stamp.
+/// Passes samples on, with the time if `stamp` is set.
 fn hop(place: &str, from: &str, to: &str, stamp: bool) {
     let mut input = BareReceiver::open(place, from, true);
     let mut output = BareSender::open(place, to, true);

@@ -1,10 +1,11 @@
-//! What the replay of an archive costs beside a bare read of the same file by the crate mcap, both in this run and in
-//! turn.
+//! Computing time of the replay of an archive, compared with a bare read of the same file by the crate mcap, both in
+//! this run and alternately.
 //!
 //!     cargo bench --bench replay --profile release [-- SECONDS]
 //!
-//! The archive is a simulated one of the bundled arm: 7 joints, 1 kHz, its states, its commands and its wrench. A replay
-//! gives what `tauscope replay` gives: every event, without any file; the last row writes the whole MCAP output.
+//! The archive is a simulated one of the bundled arm: 7 joints, 1 kHz, its states, its commands and its wrench. A
+//! replay computes every event, as `tauscope replay` does, without writing a file; the last row writes the whole MCAP
+//! output.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -18,9 +19,9 @@ mod recording;
 
 use recording::{robot, simulate};
 
-/// How often each is done, in turn: the least of the times is the one in which the machine did nothing else.
+/// Number of alternating rounds; the least of the times is the one with the least other load.
 const ROUNDS: usize = 7;
-/// What a replay must reach \[of a bare read's speed, times real time\].
+/// Goals of a replay \[of a bare read's speed, times real time\].
 const GOAL: (f64, f64) = (0.35, 500.0);
 
 const ONE: &str =

@@ -1,4 +1,4 @@
-//! Tells the supervisor, and so people, what a detector or a watch finds, as it finds it.
+//! Reports the events of detect and explain stages to the supervisor as they occur.
 
 mod clock;
 pub mod commands;
@@ -12,25 +12,25 @@ use tauscope_bus::{
 use tauscope_pipeline::cell::CellFacts;
 use tauscope_watch as watch;
 
-/// A detect or explain stage whose events are told to the supervisor. Its stream is untouched.
+/// A detect or explain stage whose events are reported to the supervisor; its output stream is unchanged.
 pub struct Announced<S> {
     stage: S,
     told: Told,
 }
 
-/// What has been told so far.
+/// State of the reports of one stage.
 struct Told {
-    /// Who finds it.
+    /// Name of the stage.
     stage: String,
     joint_names: Vec<String>,
     effort_unit: &'static str,
-    /// Stamp of the first sample, from which times are counted \[ns\].
+    /// Stamp of the first sample, the origin of reported times \[ns\].
     start_ns: Option<i64>,
     contacts: ContactFollower,
 }
 
 impl<S> Announced<S> {
-    /// `stage` of that name in a cell.
+    /// Wraps `stage`, which is called `name` in `cell`.
     pub fn new(name: &str, stage: S, cell: &CellFacts) -> Self {
         let told = Told {
             stage: name.to_owned(),
@@ -89,7 +89,7 @@ impl Emit<Detection> for Listener<'_> {
     }
 }
 
-/// A contact that begins, and where it seems to be.
+/// Describes the onset of a contact, with its link if known.
 fn first_guess(detection: &Detection) -> String {
     if detection.link.as_str().is_empty() {
         return detection.state.to_string();
@@ -98,7 +98,7 @@ fn first_guess(detection: &Detection) -> String {
 }
 
 impl Told {
-    /// What is to be said of a sample: what ends there, then what begins.
+    /// Returns the lines to report for a sample: the event that ends, then the event that begins.
     fn lines(&mut self, detection: &Detection) -> Vec<String> {
         let start_ns = *self.start_ns.get_or_insert(detection.header.stamp_ns);
         let t = (detection.header.stamp_ns - start_ns) as f64 * 1e-9;
@@ -119,7 +119,7 @@ impl Told {
         }
     }
 
-    /// What a watch noticed, which is told once it is sure.
+    /// Describes a change of the arm that the watch has detected.
     fn change(&self, t: f64, start_ns: i64, detection: &Detection) -> String {
         let since = (detection.contact_ns - start_ns) as f64 * 1e-9;
         let words = watch::in_words(detection, &self.joint_names, self.effort_unit);
@@ -131,7 +131,7 @@ impl Told {
         format!("{t:8.3} s  since {since:.1} s: {words}{over}")
     }
 
-    /// What is known of a contact that is over.
+    /// Describes a contact that has ended: duration, peak and loaded joints.
     fn over(&self, contact: &Contact) -> String {
         let mut text = format!("over after {}", contact.duration_in_words());
         if contact.peak().is_some() {

@@ -7,19 +7,19 @@ use crate::commands::{
     init, man, manifest, physics, query, repair, replay, run, schema, send, simulate, stage, weeks,
 };
 
-/// A robot's measured effort beside its digital twin's: stream, detect, record.
+/// Compare a robot's measured effort with that of its digital twin: stream, detect, record, explain.
 ///
 /// Exit codes: 0 done; 1 failed; 2 wrong arguments or files (nothing was started); 3 done, but data
 /// was lost (the summary says which and how much).
 #[derive(Debug, Parser)]
 #[command(version, propagate_version = true)]
 pub struct Cli {
-    /// Without one: run.
+    /// The command; `run` if none is given.
     #[command(subcommand)]
     pub command: Option<Command>,
 }
 
-/// What there is to do; each in its own module of [`crate::commands`].
+/// The commands, each in its own module of [`crate::commands`].
 #[derive(Debug, Subcommand)]
 pub enum Command {
     Run(run::Args),

@@ -1,4 +1,4 @@
-//! The commands, a module each: its arguments and what it does.
+//! The commands, one module each: arguments and implementation.
 
 pub mod calibrate;
 pub mod check;
@@ -30,13 +30,13 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tauscope_bus::EffortUnit;
 
-/// Reads a unit of effort.
+/// Returns a parser for the unit of the effort.
 fn effort_unit() -> impl TypedValueParser<Value = EffortUnit> {
     let names = EffortUnit::ALL.map(EffortUnit::as_str);
     PossibleValuesParser::new(names).try_map(|text| text.parse::<EffortUnit>())
 }
 
-/// The pipeline file, named as an argument or with `--pipeline`.
+/// Returns the pipeline file, named as an argument or with `--pipeline`; by default `pipeline.yaml`.
 fn pipeline_file<'a>(argument: Option<&'a PathBuf>, option: Option<&'a PathBuf>) -> &'a Path {
     let named = argument.or(option).map(PathBuf::as_path);
     named.unwrap_or(Path::new("pipeline.yaml"))

@@ -1,6 +1,6 @@
-//! What on this machine would keep a pipeline from running, and what to do about it.
+//! Checks for anything on this machine that would keep a pipeline from running, with remedies.
 //!
-//! [`facts`] reads the machine, [`verdicts`] judges what was read and touches nothing.
+//! [`facts`] reads the machine; [`verdicts`] judges the facts and has no side effects.
 
 mod certificate;
 mod endpoint;
@@ -9,20 +9,20 @@ pub mod verdicts;
 
 use serde::Serialize;
 
-/// How it stands with one thing.
+/// Severity of a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
     /// As it should be.
     Ok,
-    /// A pipeline runs, but not as well or not for long.
+    /// A pipeline runs, but degraded or not for long.
     Warning,
-    /// It would keep a pipeline from running or from recording.
+    /// A pipeline cannot run or record.
     Error,
 }
 
 impl Level {
-    /// In the words of the list.
+    /// Returns the severity as it is printed.
     pub fn word(self) -> &'static str {
         match self {
             Self::Ok => "ok",
@@ -32,22 +32,21 @@ impl Level {
     }
 }
 
-/// What was found of one thing.
+/// Verdict of one check.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Verdict {
-    /// The thing.
+    /// Name of the check.
     pub check: &'static str,
-    /// How it stands.
+    /// Severity.
     pub level: Level,
-    /// What was found.
+    /// Finding, as a clause.
     pub found: String,
-    /// What to do; nothing where all is well.
+    /// Remedy; none if all is well.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remedy: Option<String>,
 }
 
-/// What keeps any run from using shared memory here, and what to do: too little of it would end the
-/// stages with a bus error.
+/// Returns the verdict on shared memory if it is an error: with too little of it, stages would die of a bus error.
 pub fn no_shared_memory() -> Option<Verdict> {
     let verdict = verdicts::shared_memory(&facts::shared_memory());
     (verdict.level == Level::Error).then_some(verdict)

@@ -1,4 +1,4 @@
-//! Results never take the place of files that are there, unless somebody says so.
+//! Protection of existing files: results replace them only with `--force`, and never replace an input.
 
 use std::path::{Path, PathBuf};
 
@@ -6,23 +6,23 @@ use tauscope_pipeline::report::{Problem, Report};
 
 use crate::exit::Failure;
 
-/// Files that are named; the rest is counted.
+/// Maximum number of files that an error names; the others are counted.
 const MAX_NAMED: usize = 5;
 
-/// Whether results may take the place of files.
+/// Whether results may replace existing files.
 #[derive(Debug, Clone, Copy, Default, clap::Args)]
 pub struct Force {
-    /// Replace files that have the names of the results.
+    /// Replace existing files that have the names of the results.
     #[arg(long)]
     force: bool,
 }
 
 impl Force {
-    /// As [`check`](Self::check), and refuses where a result would take the place of what the command reads. That
-    /// may nobody allow: the input would be lost.
+    /// Checks like [`check`](Self::check), and also fails if a result would replace an input of the command. This is
+    /// never allowed, because the input would be lost.
     ///
     /// # Errors
-    /// The inputs in the way, or else the files.
+    /// The inputs that would be replaced, or else the existing files.
     pub fn check_beside<'a>(
         self,
         results: impl IntoIterator<Item = PathBuf>,
@@ -33,16 +33,15 @@ impl Force {
         self.check(results)
     }
 
-    /// Refuses where one of `results` is there already, and nobody said that it may be replaced. Nothing is
-    /// touched here.
+    /// Fails if one of `results` exists already, unless `--force` is given. Changes no file.
     ///
     /// # Errors
-    /// The files in the way: the first few and their number.
+    /// The existing files: the first few, and their number.
     pub fn check(self, results: impl IntoIterator<Item = PathBuf>) -> Result<(), Failure> {
         if self.force {
             return Ok(());
         }
-        // A link that leads nowhere is in the way, too.
+        // A dangling symbolic link is an existing file, too.
         let mut there: Vec<PathBuf> = results
             .into_iter()
             .filter(|path| path.symlink_metadata().is_ok())
@@ -56,7 +55,7 @@ impl Force {
                 Err(refused(&title))
             }
             files => {
-                // The folder that holds them all.
+                // Innermost common folder of the files.
                 let mut folder = files[0].parent().unwrap_or(Path::new(""));
                 while let Some(above) = folder.parent()
                     && !files.iter().all(|file| file.starts_with(folder))
@@ -89,10 +88,10 @@ impl Force {
     }
 }
 
-/// Refuses where one of `results` would take the place of one of `inputs`.
+/// Fails if one of `results` would replace one of `inputs`.
 ///
 /// # Errors
-/// Each input in the way.
+/// Each input that would be replaced.
 pub fn keep_inputs<'a>(
     results: &[PathBuf],
     inputs: impl IntoIterator<Item = &'a PathBuf>,
@@ -108,7 +107,7 @@ pub fn keep_inputs<'a>(
     report.into_result(())
 }
 
-/// Whether the file at `result` is `input`, or a piece of a recording that is a folder.
+/// Whether the file at `result` is `input`, or a piece of it if it is the folder of a recording.
 fn takes_place(result: &Path, input: &Path) -> bool {
     const PIECES: [&str; 3] = ["mcap", "db3", "yaml"];
     let (Ok(result), Ok(input)) = (result.canonicalize(), input.canonicalize()) else {

@@ -1,20 +1,20 @@
-//! How a command ends.
+//! Outcomes of commands and their exit codes.
 
 use tauscope_pipeline::report::{Problem, Report};
 
 use crate::output::Output;
 use crate::terminal;
 
-/// How a command ended that did what was asked.
+/// Outcome of a command that was started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
     /// Done, nothing lost.
     Done,
-    /// Begun, but not brought to its end; the reason was said where it came up.
+    /// Started, but not completed; the reason was reported when it occurred.
     Failed,
     /// Done, but data was lost. The summary says which and how much.
     Lossy,
-    /// Wrong arguments or files: nothing was started, and the result says why.
+    /// Wrong arguments or files: nothing was started, and the result gives the reason.
     Rejected,
 }
 
@@ -35,14 +35,14 @@ impl Exit {
     }
 }
 
-/// Why a command did not do what was asked.
+/// Reason why a command failed.
 #[derive(Debug)]
 pub enum Failure {
     /// Wrong arguments or files: nothing was started.
     Rejected(Report),
-    /// Something failed on the way.
+    /// An error during the work.
     Failed(anyhow::Error),
-    /// Ctrl-C or SIGTERM; how far it got, and what is there of it.
+    /// Ctrl-C or SIGTERM, with the progress at that time and the results that exist.
     Interrupted(String),
 }
 
@@ -76,7 +76,7 @@ impl From<anyhow::Error> for Failure {
     }
 }
 
-/// The exit code, which is the same for every command; what went wrong is said.
+/// Reports what went wrong, and returns the exit code, which has the same meaning for every command.
 ///
 /// 0 done; 1 failed; 2 wrong arguments or files, nothing was started; 3 done, but data was lost.
 pub fn code(outcome: Result<Exit, Failure>, out: &mut Output) -> u8 {
@@ -104,7 +104,7 @@ pub fn code(outcome: Result<Exit, Failure>, out: &mut Output) -> u8 {
     }
 }
 
-/// An error and its causes; what one says already, the next does not say again.
+/// Formats an error and its causes; a cause that the text already contains is omitted.
 fn told_once(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
     for cause in error.chain().skip(1).map(ToString::to_string) {

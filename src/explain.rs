@@ -1,5 +1,5 @@
-//! `tauscope explain` around the engine: from a case or arguments to what the engine takes, and from what
-//! it says to files.
+//! `tauscope explain` around the engine: from a case or arguments to the engine's input, and from its outcome to
+//! files.
 
 mod input;
 mod output;
@@ -23,13 +23,14 @@ pub use output::{json, make, refuse_to_replace, write};
 pub use read::{Kept, read};
 pub use words::text;
 
-/// Sentences about the robot file: which of its numbers are replaced, and which joints are made `fixed`.
+/// Returns sentences about the robot file: which of its numbers are replaced, and which joints are made `fixed`.
 pub fn of_robot(request: &Request) -> Vec<String> {
     let findings = request.cell.findings.iter().cloned();
     findings.chain(request.note.clone()).collect()
 }
 
-/// Names and hashes of the inputs. That of the robot is of its file; the text that was used may differ ([`of_robot`]).
+/// Returns names and hashes of the inputs. The robot's hash is that of its file; the text that was used may differ
+/// ([`of_robot`]).
 fn provenance_of(request: &Request) -> std::io::Result<BTreeMap<String, String>> {
     let version = env!("CARGO_PKG_VERSION").to_owned();
     let mut all = BTreeMap::from([("tauscope".to_owned(), version)]);

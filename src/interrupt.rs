@@ -1,12 +1,12 @@
-//! Ctrl-C and SIGTERM, for every command that is one piece of work. (`run` ends its stages in order itself.)
+//! Ctrl-C and SIGTERM, for all commands but `run`, which ends its stages itself.
 //!
-//! A command that computes, and writes at its end, is ended where it is: a thread waits for the signal, removes what
-//! is unfinished, says how far it got, and leaves with exit code 1. A command that has something to bring to its end,
-//! or that writes right now, takes a [`Hold`]: then the signal is only noted, the command asks for it ([`is_asked`])
-//! between its steps and says itself how far it got. A second signal ends it in any case.
+//! A command that computes, and writes at its end, is terminated at once: a thread waits for the signal, removes
+//! unfinished files, reports the progress and exits with code 1. A command that must complete something, or that is
+//! writing, takes a [`Hold`]: the signal is then only noted, the command polls it ([`is_asked`]) between its steps,
+//! and reports its progress itself. A second signal terminates it in any case.
 //!
-//! A command whose files are of use only together has an [`Undo`]: what it has written is taken away again where the
-//! command fails, and where a signal ends it.
+//! A command whose files are only of use together has an [`Undo`]: its files are removed if the command fails or a
+//! signal terminates it.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -15,14 +15,14 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use tauscope_archive::whole_file;
 use tokio::signal::unix::{SignalKind, signal};
 
-/// Exit code of work that was not brought to its end.
+/// Exit code of work that was not completed.
 const EXIT_CODE: i32 = 1;
 
-/// Somebody has asked.
+/// Whether a signal has arrived.
 static ASKED: AtomicBool = AtomicBool::new(false);
-/// How far the work is, in percent; more than 100 where nobody knows.
+/// Progress of the work \[percent\]; above 100 if unknown.
 static PERCENT: AtomicU32 = AtomicU32::new(u32::MAX);
-/// Who holds, and what is being done. Locked while the program leaves, so that nothing begins then.
+/// Holds and current step. Locked while the program exits, so that no hold can begin.
 static STATE: Mutex<State> = Mutex::new(State {
     holds: 0,
     held: false,
@@ -32,16 +32,16 @@ static STATE: Mutex<State> = Mutex::new(State {
 
 struct State {
     holds: usize,
-    /// Somebody has brought something to its end before.
+    /// Whether an earlier hold has ended.
     held: bool,
     doing: String,
     undo: Option<Box<dyn FnOnce() + Send>>,
 }
 
-/// From now on signals end the program in order.
+/// Starts to handle signals.
 ///
 /// # Errors
-/// If they cannot be listened to.
+/// If the signal handlers cannot be installed.
 pub fn listen() -> io::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_io()
@@ -67,26 +67,26 @@ pub fn listen() -> io::Result<()> {
     Ok(())
 }
 
-/// Whether the work is to end.
+/// Returns whether a signal has asked the command to end.
 pub fn is_asked() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
 
-/// The work has come to `fraction`, from 0 to 1.
+/// Sets the progress of the work, from 0 to 1.
 pub fn far(fraction: f64) {
     PERCENT.store((100.0 * fraction) as u32, Ordering::Relaxed);
 }
 
-/// The work goes on with this.
+/// Sets the current step of the work.
 pub fn doing(what: &str) {
     what.clone_into(&mut state().doing);
 }
 
-/// While there is one, a signal is only noted.
+/// Guard that defers signals: while it exists, the first one is only noted.
 #[derive(Debug)]
 pub struct Hold(());
 
-/// What follows must be brought to an end.
+/// Starts a section that must be completed.
 pub fn hold() -> Hold {
     state().holds += 1;
     Hold(())
@@ -100,17 +100,18 @@ impl Drop for Hold {
     }
 }
 
-/// Takes away what was written, unless it is kept.
+/// Guard that removes the written files unless they are kept.
 #[derive(Debug)]
 pub struct Undo(());
 
-/// `take_away` runs if the result is dropped, and if a signal ends the program before. There is one at a time.
+/// Runs `take_away` when the returned guard is dropped, or when a signal terminates the program before. There is one
+/// guard at a time.
 pub fn undo(take_away: impl FnOnce() + Send + 'static) -> Undo {
     state().undo = Some(Box::new(take_away));
     Undo(())
 }
 
-/// All is written, and stays.
+/// Keeps the files: all are written.
 pub fn keep(undo: Undo) {
     state().undo = None;
     drop(undo);
@@ -127,7 +128,7 @@ impl Drop for Undo {
 
 fn ask() {
     let again = ASKED.swap(true, Ordering::Relaxed);
-    // Nothing else begins from here on: whoever wants to hold now waits for the end.
+    // The lock is kept until the exit: a thread that asks for a hold now waits for the end.
     let mut state = state();
     if state.holds > 0 && !again {
         return;
@@ -145,7 +146,7 @@ fn ask() {
         take_away();
         "; what was written is removed"
     } else if state.holds > 0 || state.held {
-        "; what is there is whole, what was unfinished is removed"
+        "; existing files are complete, unfinished ones are removed"
     } else {
         "; no result was written"
     };
@@ -153,7 +154,7 @@ fn ask() {
     std::process::exit(EXIT_CODE);
 }
 
-/// Nothing in here can be left half done, so a panic elsewhere does not matter.
+/// Locks the state. A panic in another thread does not matter, because every change of the state is a single step.
 fn state() -> MutexGuard<'static, State> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
 }

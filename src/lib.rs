@@ -1,5 +1,5 @@
-//! The `tauscope` program: command line, supervisor, and what it writes for people. Its physics is in the stages, its
-//! files and the stages built from them are in `tauscope_pipeline`.
+//! The `tauscope` program: command line, supervisor, and output for people. Its physics is in the stages; its files,
+//! and the stages built from them, are in `tauscope_pipeline`.
 //!
 //! [`answer`] runs a command as a function; [`answer_alone`] does so for a process that does nothing else.
 
@@ -30,14 +30,14 @@ use rustix::process::{Signal, set_parent_process_death_signal};
 use cli::{Cli, Command};
 use output::Output;
 
-/// The program: its arguments are the command line, its words go to the terminal.
+/// Runs the program with the arguments of the command line and the terminal for output.
 pub fn main() -> ExitCode {
     warnings::show(terminal::has_colour());
     match Cli::parse().command.unwrap_or_default() {
         Command::Stage(args) => commands::stage::run(&args),
         Command::Exec(args) => commands::stage::exec(&args),
         command => {
-            // A run ends its stages in order itself.
+            // `run` handles signals itself: it ends its stages first.
             if !matches!(command, Command::Run(_))
                 && let Err(error) = interrupt::listen()
             {
@@ -51,20 +51,21 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// What a command answered.
+/// Result of a command that was run as a function.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Answer {
     /// The exit code.
     pub code: u8,
-    /// What the program would have written to standard output.
+    /// Text that the program would write to standard output.
     pub stdout: String,
-    /// What it would have written to standard error, but for what stages warn of through `tracing`.
+    /// Text that it would write to standard error, without the warnings that stages log with `tracing`.
     pub stderr: String,
-    /// What is wrong with arguments or files where nothing was started, as `check --json` prints it: `{"errors": [...]}`.
+    /// Errors in arguments or files because of which nothing was started, as `check --json` prints them:
+    /// `{"errors": [...]}`.
     pub errors: serde_json::Value,
 }
 
-/// Runs a command as a function, without a process: `arguments` are those behind the program's name.
+/// Runs a command as a function, without a process: `arguments` are those after the program's name.
 ///
 /// Not for `run`, whose stages are processes of this program.
 pub fn answer(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Answer {
@@ -105,11 +106,11 @@ pub fn answer(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Answe
     }
 }
 
-/// As [`answer`], in a process that is there for this command alone and ends with the process that started it. Signals
-/// end it as they end the program; what stages warn of goes to standard error.
+/// Runs a command like [`answer`], in a process that exists for this command alone and ends with its parent. Signals
+/// terminate it as they do the program; warnings of stages go to standard error.
 ///
 /// # Errors
-/// If signals cannot be listened to.
+/// If the signal handlers cannot be installed.
 pub fn answer_alone(
     arguments: impl IntoIterator<Item = impl Into<OsString>>,
 ) -> std::io::Result<Answer> {

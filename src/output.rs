@@ -1,8 +1,8 @@
-//! Where the words of a command go.
+//! Output of a command.
 
 use std::io::Write as _;
 
-/// Where a command writes its result and its warnings.
+/// Destination of a command's results and warnings.
 #[derive(Debug)]
 pub enum Output {
     /// To standard output and standard error.
@@ -12,7 +12,7 @@ pub enum Output {
 }
 
 impl Output {
-    /// Writes a result. A reader that has gone, as `head` does, is no failure.
+    /// Writes a result. A closed pipe, as with `head`, is no failure.
     pub fn print(&mut self, text: &str) -> anyhow::Result<()> {
         let text = text.trim_end();
         match self {

@@ -1,4 +1,4 @@
-//! `tauscope physics` around the engine: recordings of a day into a table of numbers with intervals.
+//! `tauscope physics` around the engine: from recordings of a day to a table of estimates with intervals.
 
 mod night;
 mod temperature;
@@ -19,7 +19,7 @@ use crate::explain::{Request, read};
 
 pub use night::{Choice, LONGEST_S, choose};
 
-/// What goes beside the recordings.
+/// Description of a night's measurement, apart from the recordings.
 #[derive(Debug)]
 pub struct Night<'a> {
     /// The cell.
@@ -28,14 +28,14 @@ pub struct Night<'a> {
     pub arm: &'a str,
     /// Topic of `sensor_msgs/msg/Temperature`; `None` where no temperature is recorded.
     pub temperature_topic: Option<&'a str>,
-    /// How long the robot had run at the first recording \[h\].
+    /// Time since the robot was started, averaged over the recordings \[h\]; `None` if unknown.
     pub hours_since_start: Option<f64>,
 }
 
-/// Measures; the rows of the night's table, and how many rows of data were lost on reading.
+/// Measures the arm; returns the rows of the night's table, and the number of data rows lost on reading.
 ///
 /// # Errors
-/// If a recording cannot be read, or the recordings allow no numbers.
+/// If a recording cannot be read, or the recordings allow no estimate.
 pub fn rows(request: &Request, night: &Night<'_>) -> Result<(Vec<Row>, u64), Failure> {
     let input = read(request, &|_, _| {})?;
     let lost = input
@@ -95,10 +95,11 @@ pub fn rows(request: &Request, night: &Night<'_>) -> Result<(Vec<Row>, u64), Fai
     Ok((rows.collect(), lost))
 }
 
-/// Where the table of a night goes: `cell=CELL/date=DATE/physics-TIME.parquet`, by the first recording's stamp in UTC.
+/// Returns the path of a night's table: `cell=CELL/date=DATE/physics-TIME.parquet`, by the first recording's stamp in
+/// UTC.
 ///
 /// # Errors
-/// If the stamp is none, or the name cannot be that of a folder.
+/// If the stamp is invalid, or the cell's name cannot be that of a folder.
 pub fn path(history: &Path, cell: &str, stamp_ns: u64) -> Result<PathBuf, Failure> {
     if cell.is_empty() || cell.starts_with('.') || cell.contains(['/', '\\', '=', '\0']) {
         return Err(Failure::rejected(format!(
@@ -133,7 +134,7 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Opens a recording for what is known of it without reading it.
+/// Opens a recording without reading its messages.
 fn open(path: &Path) -> Result<Archive, Report> {
     Archive::open(path).map_err(|error| Problem::new(error.to_string()).into())
 }

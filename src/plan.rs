@@ -1,4 +1,4 @@
-//! From a pipeline to what runs where: streams, links and the transports they take.
+//! The plan of a pipeline: its streams, its links and their transports.
 
 mod picture;
 mod table;
@@ -10,11 +10,11 @@ use tauscope_pipeline::pipeline::{Pipeline, Role, Stage};
 pub use picture::{dot, mermaid};
 pub use table::{keep_word, table};
 
-/// What a link runs over.
+/// Transport of a link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Over {
-    /// Both ends are in one process, and the samples are handed over where they lie.
+    /// Both ends are in one process; samples are passed by reference.
     InProcess,
     /// Both ends are on one host: iceoryx2.
     SharedMemory,
@@ -23,7 +23,7 @@ pub enum Over {
 }
 
 impl Over {
-    /// In words.
+    /// Returns the transport in words.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::InProcess => "the process itself",
@@ -33,24 +33,24 @@ impl Over {
     }
 }
 
-/// One stage listening to another.
+/// A link from one stage to another.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Link {
-    /// The stage whose stream it is, by its place in [`Pipeline::stages`].
+    /// Sending stage, as an index into [`Pipeline::stages`].
     pub from: usize,
-    /// The stage that listens.
+    /// Receiving stage, as an index into [`Pipeline::stages`].
     pub to: usize,
     /// Name of the stream: `<cell>/<stage>`.
     pub stream: String,
-    /// What it carries.
+    /// Type of its samples.
     pub carries: SampleKind,
-    /// What it runs over.
+    /// Transport.
     pub over: Over,
-    /// What becomes of samples that the listener has no time for.
+    /// Overflow policy of the receiver.
     pub keep: Keep,
 }
 
-/// All links of a pipeline, in the order of the stages that listen.
+/// Returns all links of a pipeline, in the order of the receiving stages.
 pub fn links(pipeline: &Pipeline) -> Vec<Link> {
     let mut links = Vec::new();
     for (to, stage) in pipeline.stages.iter().enumerate() {
@@ -74,8 +74,8 @@ pub fn links(pipeline: &Pipeline) -> Vec<Link> {
     links
 }
 
-/// What a stage hears another over. One that takes no more than it has time for, or that may wait for a disk or a
-/// network, is never called by the one it hears.
+/// Returns the transport between two stages. Within a process, the sender calls the receiver directly, unless the
+/// receiver may skip samples or may wait for a disk or a network.
 fn over(maker: &Stage, listener: &Stage) -> Over {
     let is_called = matches!(listener.role, Role::Twin | Role::Detect | Role::Explain)
         && listener.keep == Keep::All
@@ -90,11 +90,11 @@ fn over(maker: &Stage, listener: &Stage) -> Over {
     }
 }
 
-/// For each stage the first one of its tree: the source, or the stage that hears a link, from which it gets its samples
-/// without leaving the process.
+/// Returns for each stage the root of its group: the source, or the stage that receives a link, from which samples
+/// reach it without leaving the process.
 pub fn roots(pipeline: &Pipeline, links: &[Link]) -> Vec<usize> {
     let mut roots: Vec<usize> = (0..pipeline.stages.len()).collect();
-    // Each stage comes after those it listens to.
+    // Stages are in topological order: each comes after its inputs.
     for at in 0..roots.len() {
         let above = links
             .iter()

@@ -1,4 +1,4 @@
-//! Programs that are built apart, so that nobody waits for `DataFusion` who does not ask in SQL.
+//! Programs that are built separately, so that only users of SQL have to build `DataFusion`.
 
 use std::ffi::OsString;
 use std::io::ErrorKind;
@@ -16,12 +16,12 @@ use crate::output::Output;
 pub struct Program {
     /// Its name.
     pub name: &'static str,
-    /// What it says to `--help`, for where it is not there.
+    /// Its help text, printed if it is not installed.
     pub help: &'static str,
 }
 
 impl Program {
-    /// How it is built.
+    /// Returns the command that builds it.
     fn build(self) -> String {
         format!(
             "cargo build --release --manifest-path query/Cargo.toml --target-dir target -p {}",
@@ -30,7 +30,8 @@ impl Program {
     }
 }
 
-/// Runs the program, which lies beside this one or on the PATH. Where it does not, it still says what it is for.
+/// Runs the program, which is searched next to this one and on the PATH. If it is missing, `--help` still prints its
+/// help text.
 pub fn run(program: Program, arguments: &[OsString], out: &mut Output) -> Result<Exit, Failure> {
     let name = program.name;
     let beside = std::env::current_exe()
@@ -63,7 +64,7 @@ pub fn run(program: Program, arguments: &[OsString], out: &mut Output) -> Result
             Ok(Exit::Done)
         }
         Err(error) if error.kind() == ErrorKind::NotFound => {
-            let title = format!("{name} is neither beside this program nor on the PATH");
+            let title = format!("{name} is neither next to this program nor on the PATH");
             let build = format!("build it in the folder of the project: {}", program.build());
             Err(Failure::Rejected(Problem::new(title).help(build).into()))
         }
@@ -82,7 +83,7 @@ fn asks_for_help(arguments: &[OsString]) -> bool {
 mod tests {
     use super::*;
 
-    /// No such program is anywhere.
+    /// A program that does not exist.
     const MISSING: Program = Program {
         name: "tauscope-that-is-not-built",
         help: "What it does.",

@@ -1,4 +1,4 @@
-//! How far a computation is: a bar on a terminal; elsewhere, as in a pipe or a log, now and then a line.
+//! Progress of a computation: a bar on a terminal; elsewhere, as in a pipe or a log, an occasional line.
 
 mod lines;
 
@@ -12,12 +12,12 @@ use crate::output::Output;
 use crate::{interrupt, terminal};
 use lines::Lines;
 
-/// Steps of the bar; a recording's part is at least one of them.
+/// Number of steps of the bar; a recording's part is at least one of them.
 const STEPS: f64 = 10_000.0;
-/// How often it is looked whether a line is due.
+/// Poll interval for a line that is due.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// Whether progress is told.
+/// Option to suppress the progress display.
 #[derive(Debug, Clone, Copy, Default, clap::Args)]
 pub struct Quiet {
     /// Show no progress: only results, warnings and errors.
@@ -25,7 +25,7 @@ pub struct Quiet {
     quiet: bool,
 }
 
-/// What is shown of the progress.
+/// Kind of progress display.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Show {
     /// Nothing.
@@ -37,7 +37,8 @@ pub enum Show {
 }
 
 impl Quiet {
-    /// What a command that writes to `out` shows. Where its words go to memory, nobody reads lines meanwhile.
+    /// Returns the kind of display of a command that writes to `out`. Output to memory gets no lines, because it is
+    /// only read at the end.
     pub fn show(self, out: &Output) -> Show {
         match (self.quiet, out) {
             (true, _) => Show::Nothing,
@@ -47,28 +48,28 @@ impl Quiet {
     }
 }
 
-/// How far the recordings are, together.
+/// Progress of all recordings together.
 #[derive(Debug)]
 pub struct Progress {
     bar: ProgressBar,
     done: Arc<Mutex<Parts>>,
-    /// Ends the thread that writes lines, by being dropped.
+    /// Stops the thread that writes lines, when dropped.
     _ends: Option<mpsc::Sender<()>>,
 }
 
-/// How far each recording is.
+/// Progress of each recording.
 #[derive(Debug)]
 struct Parts {
-    /// From 0 to 1.
+    /// Progress of each recording, from 0 to 1.
     fractions: Vec<f64>,
     sum: f64,
-    /// The step that was told last.
+    /// Current step.
     what: String,
-    /// How far the work said that it is, and when it came to that.
+    /// Reported progress, and the time when it was reached.
     said: (f64, Instant),
 }
 
-/// Standard error, where it can redraw.
+/// Returns standard error if it can redraw, else a hidden target.
 pub fn draw_target() -> ProgressDrawTarget {
     if terminal::can_redraw() {
         ProgressDrawTarget::stderr()
@@ -78,7 +79,7 @@ pub fn draw_target() -> ProgressDrawTarget {
 }
 
 impl Progress {
-    /// Over `count` recordings.
+    /// Creates the display of progress over `count` recordings.
     pub fn new(count: usize, show: Show) -> Self {
         let target = match show {
             Show::Nothing => ProgressDrawTarget::hidden(),
@@ -103,8 +104,8 @@ impl Progress {
         }
     }
 
-    /// Over one piece of work that says what it does ([`Progress::doing`]). Nobody knows how long
-    /// its steps take, so the bar does not say what is left.
+    /// Creates the display of a single piece of work that reports its steps ([`Progress::doing`]). The duration of a
+    /// step is unknown, so the bar shows no remaining time.
     pub fn of_work(show: Show) -> Self {
         let this = Self::new(1, show);
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} % {elapsed} {wide_msg}");
@@ -113,9 +114,9 @@ impl Progress {
         this
     }
 
-    /// The work has come to `fraction` and goes on with `what`. Where the fraction does not grow from one
-    /// step to the next, the bar creeps on, ever slower, so that it is seen to live; the same step told
-    /// again is no further one.
+    /// Reports that the work has reached `fraction` and continues with the step `what`. If the fraction does not grow
+    /// from one step to the next, the bar still advances, by less each time, to show that the work is alive.
+    /// Repeating a step does not advance it.
     pub fn doing(&self, fraction: f64, what: &str) {
         const CREEP: f64 = 0.02;
         let shown = {
@@ -138,7 +139,7 @@ impl Progress {
         interrupt::doing(what);
     }
 
-    /// Recording `index` has come to `fraction`.
+    /// Sets the progress of recording `index`.
     pub fn set(&self, index: usize, fraction: f64) {
         let mut done = locked(&self.done);
         let Some(own) = done.fractions.get_mut(index) else {
@@ -160,7 +161,7 @@ impl Parts {
         }
     }
 
-    /// Of several recordings, how many are done.
+    /// Returns the numbers of completed and of all recordings, if there are several.
     fn counted(&self) -> Option<(usize, usize)> {
         let whole = self.fractions.iter().filter(|fraction| **fraction >= 1.0);
         let all = self.fractions.len();
@@ -168,12 +169,13 @@ impl Parts {
     }
 }
 
-/// Nothing in here can be left half done, so a panic elsewhere does not matter.
+/// Locks the progress. A panic in another thread does not matter, because every change is a single step.
 fn locked(parts: &Mutex<Parts>) -> MutexGuard<'_, Parts> {
     parts.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Writes lines to standard error until the result is dropped. A thread of its own, because a step may take minutes.
+/// Writes lines to standard error until the result is dropped, in a thread of its own because a step may take
+/// minutes.
 fn tell_lines(done: &Arc<Mutex<Parts>>, began: Instant) -> mpsc::Sender<()> {
     let (ends, ended) = mpsc::channel::<()>();
     let done = Arc::clone(done);
@@ -228,7 +230,7 @@ mod tests {
         assert!(shown(&progress) > 0.1, "it is seen to live");
         progress.doing(0.6, "the next step");
         assert!((shown(&progress) - 0.6).abs() < 1e-3);
-        // What is left is told from what the work said, not from how the bar crept.
+        // The remaining time follows from the reported progress, not from the position of the bar.
         assert!((locked(&progress.done).said.0 - 0.6).abs() < 1e-9);
     }
 

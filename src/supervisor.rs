@@ -1,14 +1,13 @@
-//! Runs the stages of one host in their processes, and looks after them.
+//! Supervisor of the stages of one host, which run in worker processes.
 //!
-//! Stages of one process that hear each other are a tree: they begin, end and die together, alone or with their process.
-//! A stage that dies is started again, at once the first time and later the more often it dies; one
-//! that dies too often is given up, and with it the run. On Ctrl-C or SIGTERM the sources are ended
-//! and the rest finishes with what it has; a second time everything ends at once, but for recorders, which complete their
-//! files; a third time they end, too. A stage that does not
-//! end is named and then killed. Nothing outlives the supervisor: a stage ends when its standard input
-//! closes, and Linux kills it when its parent dies.
+//! Stages of one process that are linked within it form a group: they start, end and fail together, alone or with
+//! their process. A group that fails is restarted, at once the first time and then after growing delays; one that
+//! fails too often is given up, and the run ends. On Ctrl-C or SIGTERM the sources are ended, and the other stages
+//! finish with the samples that they have. A second signal ends everything at once but recorders, which complete
+//! their files; a third one ends these, too. A stage that does not end is reported and then killed. Nothing outlives
+//! the supervisor: a stage ends when its standard input closes, and Linux kills it when its parent dies.
 //!
-//! Whoever gets nothing it can use is named within seconds, with what is there instead ([`watchman`]).
+//! A stage that receives nothing usable is reported within seconds, with what is received instead ([`watchman`]).
 
 mod crew;
 mod exit_words;
@@ -52,30 +51,30 @@ use tauscope_pipeline::pipeline::{Pipeline, Role};
 pub use view::Verbosity;
 use view::View;
 
-/// A stage whose inputs have all ended has this long to finish by itself before it is asked to.
+/// Time for a stage to finish by itself after all of its inputs have ended; then the supervisor asks it to end.
 const GRACE: Duration = Duration::from_secs(2);
-/// Long enough where nothing is due.
+/// Timer of the event loop while nothing is due.
 const NEVER: Duration = Duration::from_hours(24);
-/// Events that are not handled yet; a stage that says more waits.
+/// Capacity of the event queue; a stage waits while it is full.
 const EVENTS: usize = 256;
-/// How often it is looked who is silent or does not end.
+/// Poll interval of the watchdog.
 const LOOK_EVERY: Duration = Duration::from_millis(250);
 
-/// How a run is looked after.
+/// Options of the supervision.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Care {
-    /// A run in which a source gives nothing for so long has failed.
+    /// Time without samples of a source after which the run fails.
     pub expect_data: Option<Duration>,
-    /// The run ends by itself so long after the first sample.
+    /// Duration of the run from the first sample; `None` if it is unlimited.
     pub for_data: Option<Duration>,
-    /// How much is told.
+    /// Verbosity of the output.
     pub verbosity: Verbosity,
 }
 
-/// Which life of which process an event belongs to.
+/// Process, and its incarnation, that an event is from.
 type Mark = (usize, u64);
 
-/// Runs the stages on `host` (all without one) until they have ended.
+/// Runs the stages on `host` (all stages if `None`) until they have ended.
 ///
 /// # Errors
 /// If the host's endpoints cannot be opened, or a process cannot be started.
@@ -85,7 +84,7 @@ pub fn run(
     host: Option<&str>,
     care: Care,
 ) -> anyhow::Result<Summary> {
-    // A run that was killed could not do it itself.
+    // Killed runs could not remove their own files.
     if let Err(error) = tauscope_bus::link::remove_left_behind() {
         eprintln!(
             "warning: what killed runs have left in /tmp and /dev/shm cannot be removed: {error}"
@@ -95,14 +94,14 @@ pub fn run(
     let router = Router::open(pipeline, links, host)?;
     let meeting_point = router.as_ref().map(Router::endpoint);
     let seats = seats::seats(pipeline, links, host, &domain, meeting_point)?;
-    // One thread: it waits for pipes, processes and signals. And Linux ties a child's life to the
-    // thread that started it.
+    // One thread, which waits for pipes, processes and signals. Linux sends the death signal of a child when the
+    // thread that started it ends.
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
         .context("cannot wait for processes")?;
     let outcome = runtime.block_on(supervise(pipeline, links, seats, &domain, care));
-    // Best effort: what is left of it does no harm.
+    // Best effort: leftovers do no harm.
     let _ = domain.remove();
     outcome
 }
@@ -140,8 +139,8 @@ async fn supervise(
         told_unready: false,
         first_sample: None,
     };
-    // Caught from before the first stage starts: an interrupt in between would kill this process and
-    // leave the recorders' files incomplete.
+    // Installed before the first stage starts: an interrupt in between would kill this process and leave the
+    // recorders' files incomplete.
     let signals = [
         signal(SignalKind::interrupt()).context("cannot catch Ctrl-C")?,
         signal(SignalKind::terminate()).context("cannot catch SIGTERM")?,
@@ -159,17 +158,17 @@ struct Supervisor<'a> {
     shared_memory: Option<SharedMemory>,
     sender: mpsc::Sender<(Mark, Event)>,
     stopping: bool,
-    /// Everything was to end at once, but for recorders.
+    /// Whether everything but recorders has been ended at once.
     hurried: bool,
-    /// Why it ends.
+    /// Reason for the end of the run.
     ended: Ended,
     view: View,
     service: Service,
     care: Care,
     began: Instant,
-    /// It was told which stages do not begin.
+    /// Whether stages that are not ready have been reported.
     told_unready: bool,
-    /// When a source gave its first sample.
+    /// Time of the first sample of a source.
     first_sample: Option<Instant>,
 }
 
@@ -194,7 +193,7 @@ impl Supervisor<'_> {
     }
 
     fn take(&mut self, (crew, life): Mark, event: Event) {
-        // Each life's exit is its last event, so there are none of earlier ones.
+        // The exit is the last event of an incarnation, so none of an earlier one can follow.
         debug_assert_eq!(self.crews[crew].life, life, "an event of another life");
         match event {
             Event::Said(line) => self
@@ -209,7 +208,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Takes a line of a process's standard output.
+    /// Handles a line of a process's standard output.
     fn hear(&mut self, crew: usize, line: &str) {
         let Some(index) = self.speaker(crew, line) else {
             let name = &self.crews[crew].name;
@@ -224,7 +223,7 @@ impl Supervisor<'_> {
                     self.tree_ended(root);
                 }
             }
-            // What follows of that is looked at four times a second.
+            // The watchdog reads these states at its next poll.
             Reported::Stuck | Reported::Holds => {}
             Reported::Ready { missing } => {
                 let missing = match missing {
@@ -245,7 +244,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Whether what the stage at `index` finds raises no stop: the source of its cell says that a mute holds.
+    /// Whether alarms of the stage at `index` raise no stop, because the source of its cell reports a mute.
     fn is_muted(&self, index: usize) -> bool {
         let finder = &self.stages[index];
         let of =
@@ -258,8 +257,8 @@ impl Supervisor<'_> {
             })
     }
 
-    /// Frees what the dead process still holds in shared memory, so that those who wait for it go on
-    /// and its next life finds room.
+    /// Frees the shared memory that a dead process still holds, so that processes waiting for it continue and its
+    /// next incarnation finds free memory.
     fn clean(&self) {
         if let Some(shared_memory) = &self.shared_memory {
             shared_memory.clean_dead_peers();
@@ -276,8 +275,8 @@ impl Supervisor<'_> {
         self.stop();
     }
 
-    /// Somebody does not want to wait. A recorder that is killed would leave a `.part`, so it is asked to complete what
-    /// it has; the next time nobody is spared.
+    /// Kills all processes but those of recorders, which are asked to complete their files: a killed recorder would
+    /// leave a `.part`. A second call kills these, too.
     fn end_at_once(&mut self) {
         let spares = !std::mem::replace(&mut self.hurried, true);
         let records = |crew: &Crew| crew.stages.iter().any(|&index| self.is_recorder(index));
@@ -302,7 +301,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Ends the stages that listen to nobody here; the others follow as their inputs end.
+    /// Ends the run: the stages without inputs on this host are asked to end; the others follow as their inputs end.
     fn stop(&mut self) {
         self.stopping = true;
         service::ends();
@@ -312,7 +311,8 @@ impl Supervisor<'_> {
         self.settle();
     }
 
-    /// Asks those to end whose time has come.
+    /// Ends stages whose inputs on this host are over. If the run stops, sources and stages with inputs from other
+    /// hosts are asked at once; stages with local inputs only get [`GRACE`] to finish by themselves.
     fn settle(&mut self) {
         for index in 0..self.stages.len() {
             let inputs = &self.pipeline.stages[self.stages[index].at].inputs;

@@ -1,4 +1,4 @@
-//! What the terminal can do, if there is one.
+//! Capabilities of the terminal, if there is one.
 
 use std::io::IsTerminal as _;
 

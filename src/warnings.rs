@@ -1,11 +1,11 @@
-//! What stages warn of, and what libraries fail in, goes where errors go.
+//! Log output: warnings of stages and errors of libraries, on standard error.
 
 use tracing::{Metadata, Subscriber};
 use tracing_subscriber::filter::{FilterExt as _, LevelFilter, Targets, filter_fn};
 use tracing_subscriber::fmt::MakeWriter;
 use tracing_subscriber::prelude::*;
 
-/// From now on they are written to standard error.
+/// Starts to write the log to standard error.
 pub fn show(coloured: bool) {
     subscriber(std::io::stderr, coloured).init();
 }
@@ -26,10 +26,10 @@ fn subscriber(
     tracing_subscriber::registry().with(lines.with_filter(said))
 }
 
-/// A Zenoh session that is dropped says goodbye to its peers, and if one of them does not answer for 10 s, it logs
-/// `close operation timed out!` with a path of Zenoh's source code. It is at the end of a run, nobody can do anything
-/// about it, and samples that did not arrive are counted by the links. The event has an error and no message; all
-/// others of that module have one, and are shown.
+/// Whether an event is the timeout of a Zenoh session that closes. A session that is dropped notifies its peers; if
+/// one of them does not answer for 10 s, it logs `close operation timed out!` with a path of Zenoh's source code.
+/// This happens at the end of a run and has no remedy, and undelivered samples are counted by the links. The event
+/// has an error and no message; all other events of that module have a message, and are shown.
 fn is_goodbye_unheard(event: &Metadata<'_>) -> bool {
     event.target() == "zenoh::api::session" && event.fields().field("message").is_none()
 }

@@ -1,5 +1,5 @@
-//! An archive is replayed recording by recording: the same files whoever does it, and nothing twice; and two such
-//! results are compared.
+//! Replay of an archive, recording by recording: every runner gives the same files, and no recording is replayed
+//! twice. Also the comparison of two results.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::collections::BTreeMap;
@@ -64,7 +64,7 @@ fn replay(manifest: &Path, pipeline: &Path, out: &Path, more: &[&str]) -> Comman
     command
 }
 
-/// Where scripts find the program under test.
+/// PATH with the folder of the program under test.
 fn path_with_the_program() -> OsString {
     let programs = Path::new(env!("CARGO_BIN_EXE_tauscope")).parent().unwrap();
     let path = std::env::var_os("PATH").unwrap_or_default();
@@ -72,7 +72,7 @@ fn path_with_the_program() -> OsString {
     std::env::join_paths(all).unwrap()
 }
 
-/// Every result by its name in the folder.
+/// Contents of all results by relative path.
 fn contents(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let files = parquet_files(out).unwrap();
     let content = |path: PathBuf| {
@@ -122,7 +122,7 @@ fn shards_make_the_whole_and_what_failed_is_listed_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let manifest = archive(folder.path());
     let pipeline = pipeline(folder.path(), "");
-    // Another recording by now, though of the same name.
+    // Replaces the recording by another one with the same name.
     let archive = folder.path().join("archive");
     std::fs::copy(
         archive.join("demo.mcap"),
@@ -282,7 +282,7 @@ fn the_command_line_of_the_cluster_jobs_is_one_that_the_program_takes() {
                 .replace("$(COUNT)", container["env"][0]["value"].as_str().unwrap())
         })
         .collect();
-    // Everything but the files is right: it is they that are told to be missing.
+    // All arguments are valid except the files, so the errors must name these.
     let out = Out::answer(arguments);
     assert_eq!(out.code, 2);
     assert!(
@@ -321,6 +321,6 @@ fn an_archive_whose_runners_are_killed_and_meet_ends_with_the_same_files() {
     let out = Out::of(command);
     assert_eq!(out.code, 0, "{}{}", out.stdout, out.stderr);
     let demands = out.stdout.lines().filter(|line| line.starts_with("ok  "));
-    // Its memory may be too short-lived to be seen.
+    // The memory of a short-lived process may not have been sampled.
     assert!(demands.count() >= 12, "{}", out.stdout);
 }

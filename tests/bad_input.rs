@@ -1,7 +1,7 @@
-//! Damaged recordings and sets that lack something, in `evaluate`, `replay` and `run`: said in words, or counted and
-//! ended with exit code 3; never passed over.
+//! Damaged recordings and incomplete sets, in `evaluate`, `replay` and `run`: reported as errors, or counted with
+//! exit code 3; never silently ignored.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ fn a_detector_that_needs_kinds_says_which_recordings_have_none() {
             "`labels`",
         ],
     );
-    // One that needs none runs, and it is said what was taken for granted.
+    // A detector that needs no labels runs, and the assumption about them is reported.
     let run = evaluate(&set, &out, &["--detectors", "naive_difference"]);
     assert_eq!(run.code, 0, "{}", run.stderr);
     let said = "Recordings without labels are treated as free of contacts: demo_train_points";
@@ -71,7 +71,7 @@ fn a_set_with_no_contact_scores_none_of_the_light_detectors_and_says_no_zero() {
     refused(&run, &["contact_classifier", "labels"]);
 }
 
-/// What is done to a joint state, by its place; false takes it out.
+/// Change of a joint state, by its row; false removes it.
 type Damage = fn(usize, &mut JointState) -> bool;
 
 #[test]
@@ -167,7 +167,7 @@ fn repeated_stamps_change_no_event() {
     let mut before = None;
     let repeated = changed(folder.path(), "demo.mcap", |row, state| {
         match before.replace(state.clone()) {
-            // A driver that says the same twice.
+            // A driver that repeats a message.
             Some(before) if (500..700).contains(&row) && row % 2 == 1 => *state = before,
             _ => {}
         }

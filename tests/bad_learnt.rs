@@ -1,7 +1,7 @@
-//! What was learnt for another robot, for other joints or at another rate: refused in words, with its place and what
-//! to do, by everything that would use it.
+//! Trained parameters for another robot, for other joints or at another rate: refused by every command that would use
+//! them, with the place and the remedy.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use crate::common::learnt_pipeline::{arm, demo, pipeline, refused, replay, run};
 use crate::common::{Out, bundled, tauscope, write};
 use serde_json::Value;
 
-/// The same of `check`, `replay` and `run`.
+/// Checks that `check`, `replay` and `run` refuse the pipeline.
 fn refused_by_all(pipeline: &Path, recording: &Path, said: &[&str]) {
     let mut check = tauscope();
     check.arg("check").arg(pipeline);
@@ -74,7 +74,7 @@ fn what_was_learnt_of_fewer_joints_or_in_another_order_is_refused() {
     );
 }
 
-/// Every second sample: 50 instead of 100 a second.
+/// Every second sample: 50 instead of 100 per second.
 fn slow(folder: &Path) -> PathBuf {
     changed(folder, "demo.mcap", |row, _| row % 2 == 0)
 }
@@ -100,7 +100,7 @@ fn what_was_learnt_at_another_rate_ends_a_replay_and_a_run_and_is_not_started_ag
         .unwrap();
     assert_eq!(tauscope["restarts"], 0);
     assert_eq!(tauscope["failed"], true);
-    // The sources were ended before they had given out everything, perhaps.
+    // The sources may have been ended before they had emitted everything.
     let twin = stages
         .iter()
         .find(|stage| stage["stage"] == "twin")
@@ -113,7 +113,7 @@ fn what_was_learnt_at_another_rate_ends_a_replay_and_a_run_and_is_not_started_ag
     );
 }
 
-/// A set whose test recording has half the rate of those that are learnt from.
+/// A set whose test recording has half the rate of the training recordings.
 fn of_two_rates(folder: &Path) -> PathBuf {
     let set = Set {
         test: slow(folder),

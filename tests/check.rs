@@ -1,6 +1,6 @@
-//! `tauscope check`: everything that is wrong at once, each at its place, and nothing started.
+//! `tauscope check`: reports all errors at once, each with its place, and starts nothing.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::Path;
 
@@ -10,12 +10,12 @@ fn check(folder: &Path, text: &str, more: &[&str]) -> Out {
     std::fs::copy(bundled().join("demo_arm.urdf"), folder.join("arm.urdf")).unwrap();
     let file = write(&folder.join("pipeline.yaml"), text);
     let mut out = Out::answer(["check", file.to_str().unwrap()].iter().chain(more));
-    // Places are told with the path as it was given.
+    // Errors name files by the path that was given.
     out.stderr = out.stderr.replace(&format!("{}/", folder.display()), "");
     out
 }
 
-/// What is said of a file that is wrong.
+/// Error output for an invalid file.
 fn errors(text: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let out = check(folder.path(), text, &[]);
@@ -263,7 +263,7 @@ error: `record` listens to `twin` twice
   |                           |
   |                           already here
 
-error: `record` puts out nothing that one could listen to
+error: `record` has no output stream to listen to
  --> pipeline.yaml:8:39
   |
 8 | - {name: record, inputs: [twin, twin, record], record: {mcap: x.mcap}}

@@ -1,7 +1,8 @@
-//! An hour of clean cycles with friction that warms up (`tests/data/clean_hour.scenario.yaml`): no alarm is right. Every
-//! time in short; the whole hour with `cargo test --release --test program clean_hour -- --ignored`.
+//! An hour of contact-free cycles with friction that warms up (`tests/data/clean_hour.scenario.yaml`), in which every
+//! alarm is false. The tests run a short form; the whole hour is
+//! `cargo test --release --test program clean_hour -- --ignored`.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::Path;
 
@@ -10,7 +11,7 @@ use serde_json::Value;
 
 const DETECTORS: &str = "virtual_collision_sensor_basic,virtual_collision_sensor,tauscope";
 
-/// Runs `tauscope` and expects it to go well.
+/// Runs `tauscope`, which must succeed.
 fn done(more: &[&str], path: &Path, out: &Path) -> Out {
     let mut command = tauscope();
     command.args(more).arg(path).arg("--force");
@@ -20,8 +21,8 @@ fn done(more: &[&str], path: &Path, out: &Path) -> Out {
     done
 }
 
-/// Simulates the scenario's first `count` clean recordings after `change`, lets the detectors learn from its cold
-/// cycles, and expects them to be silent in the rest, but for so many alarms of `tauscope`.
+/// Simulates the scenario's first `count` contact-free recordings after `change`, trains the detectors on its cold
+/// cycles, and expects no alarm in the rest, except for at most `most` alarms of `tauscope`.
 fn nobody_cries(count: usize, most: u64, change: impl Fn(String) -> String) {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
@@ -87,7 +88,7 @@ fn an_hour_of_clean_cycles_raises_no_alarm() {
 #[test]
 #[ignore = "five minutes of simulation"]
 fn an_hour_of_twice_the_noise_raises_no_more_alarms_than_are_wished_for() {
-    // Five are the wish of `tauscope`.
+    // The default setting of `tauscope` allows five.
     nobody_cries(12, 5, |text| {
         let noisier = "effort_noise_of_limit: 0.004";
         text.replace("seed: 5", "seed: 6")

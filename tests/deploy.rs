@@ -1,5 +1,5 @@
-//! What stands in `deploy/` means what the program, the scripts and the other files there mean. Nothing here needs a
-//! container engine or a cluster.
+//! Consistency of `deploy/` with the program, the scripts and each other. These tests need no container engine and no
+//! cluster.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::fs;
@@ -35,7 +35,7 @@ fn kubernetes() -> [Value; 2] {
     [yaml(set), yaml(service)]
 }
 
-/// The program takes these arguments.
+/// Asserts that the program accepts these arguments.
 fn is_command_line(arguments: &[String]) {
     let help = "--help".to_owned();
     let out = Out::answer(arguments.iter().chain([&help]));
@@ -85,7 +85,7 @@ fn plants_page() -> String {
     fs::read_to_string(root().join("docs/plant.md")).unwrap()
 }
 
-/// What the plant's page puts into the file of the fleet's unit, as systemd joins its lines.
+/// Options that the plant's page writes into the file of the fleet's unit, with lines joined as by systemd.
 fn fleet_options() -> String {
     let page = plants_page();
     let (_, rest) = page.split_once("FLEET_OPTIONS=\"").unwrap();
@@ -118,7 +118,7 @@ fn the_package_brings_every_unit() {
     }
 }
 
-/// What stands behind `tls/host:`.
+/// Text after `tls/host:`.
 fn tls_port(text: &str) -> Vec<&str> {
     let mut ports: Vec<&str> = (text.split("tls/").skip(1))
         .map(|rest| {
@@ -186,7 +186,7 @@ fn every_file_that_is_mounted_is_there_or_made() {
     for name in ["cell7.yaml", "compose.yaml"] {
         fs::copy(deploy("container").join(name), folder.path().join(name)).unwrap();
     }
-    // The plant's own.
+    // Files of the plant.
     fs::copy(
         bundled().join("demo_arm.urdf"),
         folder.path().join("robot.urdf"),
@@ -208,7 +208,7 @@ fn every_file_that_is_mounted_is_there_or_made() {
             }
         }
         endpoints += &words(&service["command"]).join("\n");
-        // What a command of this service names, it sees.
+        // Every path in the command of this service is mounted.
         let command = words(&service["command"]).join(" ");
         for part in command.split([' ', '=', ';']) {
             if part.starts_with("/etc/") {
@@ -274,7 +274,7 @@ fn systemd_takes_the_units_and_finds_them_confined() {
 
 fn is_taken_and_confined(unit: &str, instance: &str) {
     let folder = tempfile::tempdir().unwrap();
-    // It looks whether the programs are there.
+    // It checks that the programs exist.
     let unit = text(&format!("systemd/{unit}")).replace("/usr/bin/tauscope", "/bin/true");
     let file = write(&folder.path().join(instance), &unit);
     let analyze = |words: &[&str]| {

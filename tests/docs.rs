@@ -1,6 +1,6 @@
 //! The files that the documentation shows are good ones.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use crate::common::{Out, bundled, root, tauscope, write};
 

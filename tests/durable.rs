@@ -1,4 +1,4 @@
-//! What outlasts a killed recorder, a power cut and a full disk.
+//! Durability of recordings after a killed recorder, a power cut and a full disk.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use crate::common::python;
 use crate::common::{Out, bundled, root, skipped, write};
 use tauscope_archive::Recording;
 
-/// The bundled recording at `rate`, recorded as `record` says.
+/// The bundled recording at `rate`, recorded with the settings `record`.
 fn pipeline(folder: &Path, rate: &str, record: &str) -> PathBuf {
     let data = bundled();
     let text = format!(
@@ -55,7 +55,7 @@ fn what_a_killed_recorder_left_is_repaired_by_its_next_life_and_joined_when_aske
     let heard = live.rest();
     let (code, summary) = live.end();
     assert_eq!(code, 3, "{summary}");
-    let said = "which a run before left unfinished, was repaired";
+    let said = "which an earlier run left unfinished, was repaired";
     assert!(heard.contains(said), "{heard}");
     let pieces = ["a.1.mcap", "a.2.mcap", "a.mcap"].map(|name| out.join(name));
     let counts: Vec<u64> = pieces.iter().map(|piece| joint_states(piece)).collect();
@@ -114,7 +114,7 @@ fn chunks_reach_the_disk_ten_times_a_second() {
         (synced as f64) < 10.0 * took_s + 2.0,
         "{synced} times in {took_s} s"
     );
-    // The folder when the file was made and when it got its name, and the file.
+    // The folder is synced when the file is created and when it is renamed, and the file once.
     assert!(count("fsync(") >= 3, "{calls}");
 }
 
@@ -126,7 +126,7 @@ fn a_full_disk_stops_neither_the_run_nor_the_detection() {
     std::fs::create_dir(&small).unwrap();
     let record = "{mcap: \"small/a-{n}.mcap\", compression: none, min_free_mb: 1}";
     let file = pipeline(folder.path(), "4", record);
-    // A disk of its own, in a namespace that ends with the run. Another program fills it and goes.
+    // A separate disk, in a namespace that ends with the run. Another program fills it and removes its file.
     let script = format!(
         "mount -t tmpfs -o size=5m none {small} || exit 77
          (sleep 1; head -c 4300000 /dev/zero >{small}/other; sleep 1.5; rm {small}/other) &
@@ -149,7 +149,7 @@ fn a_full_disk_stops_neither_the_run_nor_the_detection() {
     }
     assert_eq!(run.status.code(), Some(3), "{said}");
     assert!(said.contains("recording pauses"), "{said}");
-    assert!(said.contains("recording goes on"), "{said}");
+    assert!(said.contains("recording continues"), "{said}");
     let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
     for name in ["ingest", "twin", "detect"] {
         assert_eq!(stage(&summary, name)["dropped"], 0, "{summary}");
@@ -159,7 +159,7 @@ fn a_full_disk_stops_neither_the_run_nor_the_detection() {
         stage(&summary, "record")["dropped"].as_u64() > Some(0),
         "{summary}"
     );
-    // Every file that was closed is whole, and there are at least two.
+    // Every closed file is complete, and there are at least two.
     let whole: Vec<u64> = std::fs::read_dir(folder.path())
         .unwrap()
         .map(|entry| entry.unwrap().path())

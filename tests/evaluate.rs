@@ -1,7 +1,6 @@
-//! `tauscope evaluate` through the program: what it finds in the bundled set, what it leaves behind, and
-//! what it makes of sets that lack something.
+//! `tauscope evaluate` as a program: its results on the bundled set, its output files, and incomplete sets.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::{Path, PathBuf};
 
@@ -11,14 +10,14 @@ use serde_json::Value;
 
 const LIGHT: [&str; 2] = ["--detectors", "naive_difference,twin_regression"];
 
-/// The same with `--json`, which must have gone well.
+/// Runs `evaluate` with `--json`, which must succeed.
 fn summary(set: &Path, out: &Path, more: &[&str]) -> Value {
     let out = evaluate(set, out, &[&["--json"], more].concat());
     assert_eq!(out.code, 0, "{}", out.stderr);
     serde_json::from_str(&out.stdout).unwrap()
 }
 
-/// The numbers of a detector's first seed.
+/// Numbers of a detector's first seed.
 fn numbers<'a>(summary: &'a Value, detector: &str) -> &'a Value {
     let all = summary["detectors"].as_array().unwrap();
     &all.iter().find(|d| d["detector"] == detector).unwrap()["seeds"][0]
@@ -246,7 +245,7 @@ fn labels_of_a_set_that_are_none_are_refused() {
     );
 }
 
-/// A part of the practice set, and its scorer's own figures where Python and numpy are there.
+/// Comparison on a part of the practice set with the scorer of this set, if Python and numpy are installed.
 #[test]
 fn the_scorer_of_the_practice_sets_says_the_same() {
     const TEST: &str = "the_scorer_of_the_practice_sets_says_the_same";
@@ -261,7 +260,7 @@ fn the_scorer_of_the_practice_sets_says_the_same() {
         let each = range.map(|i| format!("{}/recordings/rec_{i:03}.mcap", paths.display()));
         each.collect::<Vec<_>>().join(", ")
     };
-    // The scorer counts what lacks as missed: labels of the recordings at hand only.
+    // The scorer counts missing recordings as missed contacts, so only the labels of the used ones are given.
     let mut labels = json(&paths.join("labels.json"));
     let all = labels["recordings"].as_object_mut().unwrap();
     all.retain(|name, _| ["rec_030", "rec_031", "rec_035", "rec_036"].contains(&name.as_str()));

@@ -1,6 +1,6 @@
 //! Corrections in simulators' own files: from a MuJoCo model and recordings to a corrected model in one command, and `export`.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,5 @@
 //! The short form of `tests/faults/faults.py`: faults done to running pipelines, and books that balance.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 mod common;
 

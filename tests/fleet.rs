@@ -1,6 +1,6 @@
-//! `tauscope fleet` beside cells that run: a router, pipelines, the page over HTTP, a cell that is killed.
+//! `tauscope fleet` with running cells: a router, pipelines, the page over HTTP, a cell that is killed.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -15,7 +15,7 @@ use tauscope_bus::{ZenohEndpoints, ZenohRouter};
 
 const PATIENCE: Duration = Duration::from_mins(1);
 
-/// An address that nobody listens at right now.
+/// An address without a listener.
 fn free() -> SocketAddr {
     let free = TcpListener::bind("127.0.0.1:0").unwrap();
     free.local_addr().unwrap()
@@ -31,7 +31,7 @@ fn router() -> (ZenohRouter, String) {
     (ZenohRouter::open(&endpoints).unwrap(), endpoint)
 }
 
-/// A cell that plays the bundled recording at half its speed and meets the others at `router`.
+/// A cell that plays the bundled recording at half its speed and connects to `router`.
 fn cell(folder: &Path, name: &str, router: &str) -> Live {
     let data = bundled();
     let data = data.display();
@@ -54,7 +54,7 @@ fn cell(folder: &Path, name: &str, router: &str) -> Live {
     Live::start(&folder, &[])
 }
 
-/// A fleet host with a page; it is ended whatever happens.
+/// A fleet host with a page; it is ended in any case.
 struct Fleet {
     child: Child,
     address: SocketAddr,
@@ -73,7 +73,7 @@ impl Fleet {
         Self::start_as(tauscope(), folder, router, users)
     }
 
-    /// The same, of a program with an environment of its own.
+    /// Starts it by a command with its own environment.
     fn start_as(mut command: Command, folder: &Path, router: &str, users: &Path) -> Self {
         command
             .current_dir(folder)
@@ -97,7 +97,7 @@ impl Fleet {
         }
     }
 
-    /// What it answers: head and body.
+    /// Sends a request; returns head and body of the answer.
     fn ask(&self, method: &str, path: &str, headers: &str, form: &str) -> (String, String) {
         let mut stream = TcpStream::connect(self.address).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -123,7 +123,7 @@ impl Fleet {
         body
     }
 
-    /// The code of an answer to a form.
+    /// Status code of the answer to a form.
     fn post(&self, path: &str, headers: &str, form: &str) -> (u16, String) {
         let (head, _) = self.ask("POST", path, headers, form);
         (head[9..12].parse().unwrap(), head)
@@ -136,7 +136,7 @@ impl Fleet {
         cell.cloned().unwrap_or(Value::Null)
     }
 
-    /// Waits until a cell is as wanted; how long that took.
+    /// Waits until a cell satisfies `wanted`; returns the time this took.
     fn wait(&self, name: &str, what: &str, wanted: impl Fn(&Value) -> bool) -> Duration {
         let begin = Instant::now();
         loop {
@@ -149,7 +149,7 @@ impl Fleet {
         }
     }
 
-    /// The first events of the wall, up to one that names `wanted`.
+    /// First events of the wall, up to one that contains `wanted`.
     fn follow(&self, wanted: &str) -> String {
         let mut stream = TcpStream::connect(self.address).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -219,14 +219,14 @@ fn cells_that_run_are_seen_acknowledged_from_the_page_and_missed_when_they_are_k
     assert!(fleet.get("/healthz").starts_with("ok"));
     assert_eq!(fleet.ask("GET", "/cells/nobody", "", "").0[9..12], *"404");
 
-    // Another fleet host, that begins now, knows as well since when it is latched.
+    // Another fleet host that starts now also knows the time of the latch.
     let other = folder.join("other");
     std::fs::create_dir(&other).unwrap();
     let other = Fleet::start(&other, &endpoint, &users);
     let since = |cell: &Value| cell["latched_since_ns"].as_i64();
     other.wait("press", "latched", |cell| since(cell).is_some());
     let apart_ns = since(&other.cell("press")).unwrap() - since(&fleet.cell("press")).unwrap();
-    // It begins with the status of up to a second ago, which the cell's cache gave it.
+    // It begins with the status from up to a second ago, which the cell's cache returns.
     assert!(apart_ns.abs() < 2_000_000_000, "{apart_ns}");
     drop(other);
 
@@ -248,7 +248,7 @@ fn cells_that_run_are_seen_acknowledged_from_the_page_and_missed_when_they_are_k
     assert!(fleet.get("/incidents").contains("at link"));
     label(&fleet, "hit <the> fixture");
 
-    // Of two that have one name neither takes a command.
+    // If two cells have the same name, neither accepts a command.
     let second = folder.join("second");
     std::fs::create_dir(&second).unwrap();
     let second = cell(&second, "weld", &endpoint);
@@ -265,11 +265,11 @@ fn cells_that_run_are_seen_acknowledged_from_the_page_and_missed_when_they_are_k
 
     signal(weld.id(), "KILL");
     let known = fleet.wait("weld", "missed", |cell| cell["state"] == "stale");
-    // The token tells it: without it, the missing status would after 3.5 s.
+    // The cell is known as lost from its token; the missing status alone would take 3.5 s.
     assert_eq!(fleet.cell("weld")["why"], "token");
     assert!(known < Duration::from_secs(3), "{known:?}");
 
-    // In order, a cell is no failure.
+    // A normal end of a cell is not a failure.
     signal(press.id(), "INT");
     fleet.wait("press", "ended", |cell| cell["state"] == "ended");
     signal(fleet.child.id(), "INT");
@@ -298,7 +298,7 @@ fn the_clock_of_a_cell_is_measured_and_told_of_where_it_is_off() {
         assert!(error_ms.abs() <= most_ms, "{cell:#}");
         cell["clock_is_off"].clone()
     };
-    // It is this computer's clock.
+    // The cell has the clock of this computer.
     let fleet = Fleet::start(folder, &endpoint, &users);
     assert_eq!(measured(&fleet, 0.0), false);
     drop(fleet);
@@ -320,7 +320,7 @@ fn the_clock_of_a_cell_is_measured_and_told_of_where_it_is_off() {
     assert!(metrics.contains(metric), "{metrics}");
 }
 
-/// Labels at the press: the label is shown with the contact and the incident that it is about, with who and when.
+/// Labels at the press: the label is shown with its contact and incident, and with user and time.
 fn label(fleet: &Fleet, text: &str) {
     let form = own_form(fleet, "/cells/press");
     let text = text
@@ -345,14 +345,14 @@ fn label(fleet: &Fleet, text: &str) {
     }
 }
 
-/// What shows that a form is the user's own, from a page that has one.
+/// Secret that proves that a form comes from the user's own page.
 fn own_form(fleet: &Fleet, page: &str) -> String {
     let page = fleet.get(page);
     let secret = page.split("name=\"csrf\" value=\"").nth(1).unwrap();
     format!("csrf={}", secret.split('"').next().unwrap())
 }
 
-/// Acknowledges at the press; forms that are not the user's own are refused.
+/// Acknowledges at the press; forms from elsewhere are refused.
 fn acknowledge(fleet: &mut Fleet, token: &str) {
     let to = "/cells/press/acknowledge";
     assert_eq!(fleet.post(to, "", "csrf=").0, 403);
@@ -392,7 +392,7 @@ fn the_document_says_what_is_missing_and_so_does_the_exit_code() {
     let state: Value = serde_json::from_str(&out.stdout).unwrap();
     assert_eq!(state["cells"][0]["state"], "never_seen");
     assert_eq!(state["sessions_reached"], 1);
-    // The router need not be there yet.
+    // The router need not exist yet.
     let nobody = format!("tcp/{}", free());
     let out = Out::answer(["fleet", "--json", "--connect", &nobody]);
     assert_eq!(out.code, 1, "{}", out.stderr);

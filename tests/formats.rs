@@ -1,6 +1,6 @@
-//! The same motion in every format that holds joint states: every command finds in it what it finds in MCAP.
+//! One motion in every format for joint states: every command gives the same results as with MCAP.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use crate::common::{Out, bundled, write};
 use serde_json::Value;
 use tauscope_twin::TwinFile;
 
-/// Those that hold stamps, names, positions, velocities and efforts just as MCAP does.
+/// Formats that store stamps, names, positions, velocities and efforts exactly as MCAP does.
 const EXACT: [Format; 3] = [
     formats::dynamic_joint_states,
     formats::ros1_bag,
@@ -25,7 +25,7 @@ fn answer(arguments: &[&OsStr]) -> Out {
     out
 }
 
-/// What `what` finds in the formats must be what it finds in MCAP.
+/// Asserts that `what` gives the same result for all formats as for MCAP.
 fn alike<T: PartialEq + std::fmt::Debug>(what: impl Fn(&Path, Format) -> T) {
     let expected = what(tempfile::tempdir().unwrap().path(), formats::mcap);
     for format in EXACT {
@@ -135,8 +135,8 @@ fn initialised(folder: &Path, format: Format) -> String {
     let twin = std::fs::read_to_string(cell.join("twin.yaml")).unwrap();
     let file: TwinFile = serde_saphyr::from_str(&twin).unwrap();
     assert!(!file.terms.is_empty(), "{twin}");
-    // Of an episode of a data set, the time starts at 0, so a session has other instants and other last digits.
-    // The noise is estimated from them, and the bodies, which are as in the URDF, are changed by what that tells.
+    // The time of an episode of a data set starts at 0, so a session has other instants and other last digits. The
+    // noise is estimated from these, and with it small corrections of the bodies, which are those of the URDF.
     let mut terms: Vec<String> = file
         .terms
         .iter()

@@ -1,4 +1,4 @@
-//! Files that are made to do harm end with a clear error, soon and in bounded memory.
+//! Malicious files end with a clear error, soon and in bounded memory.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 #![allow(unsafe_code, reason = "an allocator that watches what is asked for")]
 
@@ -17,12 +17,12 @@ use tauscope_archive::ros::{self, JointState};
 use tauscope_archive::{Recording, repair};
 use tauscope_dynamics::Model;
 
-/// The largest piece of memory that was asked for at once \[bytes\].
+/// Largest single allocation \[bytes\].
 static LARGEST: AtomicUsize = AtomicUsize::new(0);
 
 struct Watched;
 
-// SAFETY: hands everything on to the system's allocator as it is.
+// SAFETY: all calls are passed on to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Watched {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         LARGEST.fetch_max(layout.size(), Ordering::Relaxed);
@@ -45,10 +45,10 @@ unsafe impl GlobalAlloc for Watched {
 #[global_allocator]
 static ALLOCATOR: Watched = Watched;
 
-/// A chunk of an archive may unpack to so much; nothing may ask for more.
+/// Largest allowed allocation: the decompressed size of an archive's chunk, plus a margin.
 const MOST_BYTES: usize = (1 << 30) + (64 << 20);
 
-/// Changes up to six bytes, or a whole number; cuts now and then.
+/// Changes up to six bytes, or a whole number; truncates occasionally.
 fn mutated(original: &[u8], chance: &mut ChaCha8Rng) -> Vec<u8> {
     let mut bytes = original.to_vec();
     for _ in 0..chance.random_range(1..6) {
@@ -70,7 +70,7 @@ fn mutated(original: &[u8], chance: &mut ChaCha8Rng) -> Vec<u8> {
     bytes
 }
 
-/// Gives `count` mutations of `original` to `take`; none may panic or ask for much memory.
+/// Passes `count` mutations of `original` to `take`; none may panic or allocate much memory.
 fn survive(name: &str, original: &[u8], count: usize, mut take: impl FnMut(&[u8])) {
     let mut chance = ChaCha8Rng::seed_from_u64(18);
     for n in 0..count {
@@ -80,7 +80,7 @@ fn survive(name: &str, original: &[u8], count: usize, mut take: impl FnMut(&[u8]
     }
 }
 
-/// An archive of ours that is small: one tenth of a second of joint states.
+/// A small archive: one tenth of a second of joint states.
 fn small_archive(folder: &Path) -> Vec<u8> {
     let provenance = [("made_by".to_owned(), "a test".to_owned())].into();
     let path = folder.join("small.mcap");
@@ -119,7 +119,7 @@ fn no_mutation_of_an_archive_harms() {
         while let Some(message) = messages.next_message() {
             let _ = message.map(|message| message.decode::<JointState>());
         }
-        // A repair waits for the disk.
+        // A repair waits for the disk, so it is run rarely.
         if count % 10 != 0 {
             return;
         }
@@ -184,13 +184,13 @@ fn no_mutation_of_a_robot_harms() {
     });
 }
 
-/// What `make` makes is refused with these words, and soon.
+/// Asserts that the input of `make` is refused with these words, and soon.
 fn refused_soon(words: &str, make: impl FnOnce() -> String) {
     let begun = Instant::now();
     let said = make();
     let took = begun.elapsed();
     assert!(said.contains(words), "{}", &said[..said.len().min(2000)]);
-    // Minutes, before there was a limit.
+    // Without the limit it took minutes.
     assert!(took < Duration::from_secs(20), "{took:?}");
 }
 
@@ -220,7 +220,7 @@ fn a_robot_that_is_none_is_refused_with_the_limit() {
     refused_soon("which is the limit", || {
         model_error(&("<robot name=\"large\">".to_owned() + &" ".repeat(20 << 20) + "</robot>"))
     });
-    // Half a gigabyte of nothing, which takes no room on the disk.
+    // Half a gigabyte of zeros in a sparse file.
     let folder = tempfile::tempdir().unwrap();
     let urdf = folder.path().join("large.urdf");
     fs::File::create(&urdf).unwrap().set_len(500 << 20).unwrap();

@@ -1,6 +1,6 @@
 //! An archive of ours, read by the reference reader from PyPI, must hold our numbers.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use tauscope_archive::{Recording, ros};
 
 const PACKAGES: [&str; 2] = ["mcap==1.6.0", "mcap-ros2-support==0.6.0"];
 
-/// What our own reader finds in a topic.
+/// Content of a topic, as read by our own reader.
 #[derive(Default)]
 struct Topic {
     count: u64,
@@ -36,7 +36,7 @@ fn read_ourselves(path: &Path) -> BTreeMap<String, Topic> {
     topics
 }
 
-/// Replays the bundled recording into `folder`; the archive.
+/// Replays the bundled recording into `folder`; returns the archive.
 fn replayed(folder: &Path) -> PathBuf {
     let data = bundled();
     let pipeline = write(
@@ -121,7 +121,7 @@ fn the_reference_reader_finds_our_numbers() {
             );
         }
     }
-    // A twin's effort for every joint state, and a residual from where the filters have settled on.
+    // A twin's effort for every joint state, and a residual after the filters have settled.
     assert_eq!(
         ours["/twin/joint_states"].count,
         ours["/joint_states"].count

@@ -1,6 +1,6 @@
 //! `tauscope init`: from contact-free recordings to a pipeline that finds contacts.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::ffi::OsStr;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `tauscope init --live`: from a robot that moves to a pipeline that listens to it.
+//! `tauscope init --live`: from a moving robot to a pipeline for it.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::path::Path;
@@ -10,10 +10,10 @@ use crate::common::{Out, bundled, tauscope};
 use tauscope_archive::{Recording, ros};
 use zenoh::Wait as _;
 
-/// How much faster the recordings are published than they were made.
+/// Speed of publication relative to that of the recordings.
 const PACE: f64 = 2.0;
 
-/// Publishes the bundled contact-free recordings, one after the other, until told to stop.
+/// Publishes the bundled contact-free recordings in turn until `stop` is set.
 fn publish(session: &zenoh::Session, stop: &AtomicBool) {
     let key = rmw_key(0, "joint_states");
     let began = Instant::now();
@@ -69,7 +69,7 @@ fn a_moving_robot_becomes_a_pipeline_that_listens_to_it() {
     assert_eq!(out.code, 0, "{out:?}");
     let cell = folder.join("cell");
     let made = std::fs::read_dir(cell.join("recordings")).unwrap().count();
-    // Where the stream pauses between two bundled recordings, there may be one less.
+    // One may be missing at the pause of the stream between two bundled recordings.
     assert!((4..=5).contains(&made), "{made} recordings: {out:?}");
     assert!(
         !out.stdout.contains("Nothing was evaluated"),
@@ -85,7 +85,7 @@ fn a_moving_robot_becomes_a_pipeline_that_listens_to_it() {
     let text = std::fs::read_to_string(&pipeline).unwrap();
     assert!(text.contains(&format!("ingest: {{{source}}}")), "{text}");
 
-    // Nothing of an earlier start is taken for the robot's.
+    // Files of an earlier start are not used as recordings of the robot.
     let again = init(folder, &source);
     assert_eq!(again.code, 2, "{again:?}");
 

@@ -1,5 +1,5 @@
-//! Ctrl-C and SIGTERM end every command in order: what is there is whole, and it says how far it got. A stage that
-//! does not end is named and killed.
+//! Ctrl-C and SIGTERM end every command normally: existing files are complete, and the progress is reported. A stage
+//! that does not terminate is named and killed.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use std::time::Duration;
 use crate::common::live::{Live, signal, stage, wait_until};
 use crate::common::{Out, bundled, tauscope, write};
 
-/// Runs `command`, sends it a signal when `ripe`, and gives what it said.
+/// Runs `command`, sends it a signal when `ripe`, and returns its output.
 fn interrupted(mut command: Command, name: &str, ripe: impl Fn() -> bool) -> Out {
     let child = command
         .stdout(Stdio::piped())
@@ -35,7 +35,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// A scenario with one short recording and one that nobody waits for.
+/// A scenario with one short recording and one that takes too long to wait for.
 fn long_scenario(folder: &Path) -> PathBuf {
     let robot = bundled().join("demo_arm.urdf");
     write(
@@ -78,7 +78,7 @@ fn simulate_keeps_the_recordings_that_are_whole() {
     }
 }
 
-/// A recording that takes long to work on.
+/// A recording that takes long to process.
 fn long_recording(folder: &Path) -> PathBuf {
     let robot = bundled().join("demo_arm.urdf");
     let scenario = write(
@@ -150,7 +150,7 @@ stages:
         "{left:?}"
     );
 
-    // What computes first and writes at its end is ended where it is.
+    // A command that computes first and writes at its end is stopped at once.
     let twin = folder.path().join("twin.yaml");
     let report = folder.path().join("report");
     let mut calibrate = tauscope();
@@ -211,7 +211,7 @@ fn init_takes_away_what_it_has_written() {
     ] {
         init.arg(bundled().join(recording));
     }
-    // The twin is explained by then, and the detector learns.
+    // At this point the twin is explained, and the detector is being trained.
     let said = interrupted(init, "INT", || cell.join("set.yaml").exists());
     assert_eq!(said.code, 1, "{said:?}");
     assert!(
@@ -247,9 +247,9 @@ fn a_stage_that_does_not_end_is_named_and_killed() {
     let mut live = Live::start(folder.path(), &[]);
     live.wait_for("warning: stage `deaf` has not begun after 4 s");
     signal(live.id(), "INT");
-    live.wait_for("warning: stage `deaf` was told to end and still runs; it is killed in 8 s");
+    live.wait_for("warning: stage `deaf` was asked to end and still runs; it is killed in 8 s");
     live.wait_for(
-        "error: stage `deaf` did not end when it was told to, was killed and is not started again",
+        "error: stage `deaf` did not end when asked to, was killed and is not started again",
     );
     let (code, summary) = live.end();
     assert_eq!(code, 1, "{summary}");

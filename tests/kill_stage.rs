@@ -1,5 +1,5 @@
-//! Stages in processes of their own, and kill -9 of any one of them: the supervisor says so and starts it again within a second, and the
-//! others go on.
+//! Stages in separate processes, and kill -9 of any of them: the supervisor reports it and restarts the stage within
+//! a second, and the others continue.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::path::Path;
@@ -45,7 +45,8 @@ fn kill_and_watch(victim: &str) {
     ));
     let again = live.wait_for_stage(victim);
     let took = at.elapsed();
-    // On a quiet machine within a second, which `tests/faults/faults.py` holds; here others run beside it.
+    // On an idle machine within a second, which `tests/faults/faults.py` checks; here other tests run at the same
+    // time.
     assert!(
         took < Duration::from_secs(10),
         "{victim} was back after {took:?}"
@@ -69,12 +70,13 @@ fn kill_and_watch(victim: &str) {
         );
         assert_eq!(stage(&summary, name)["failed"], false, "{name}: {summary}");
     }
-    // A stage misses what was on its way to it; with a source dies what was on its way from it. That is said.
+    // A killed stage loses the samples in transit to it, a killed source those in transit from it. The loss is
+    // reported.
     let dropped = stage(&summary, victim)["dropped"].as_u64().unwrap();
     assert!(victim == "ingest" || dropped > 0, "{victim}: {summary}");
     let lost = books_balance(&summary);
     assert_eq!(code, if lost > 0 { 3 } else { 0 }, "{victim}: {summary}");
-    // A source goes on where it was: nothing twice.
+    // A source continues at its last sample and repeats nothing.
     let whole = stage(&summary, "ingest")["emitted"].as_u64().unwrap();
     assert!((3_000..=3_001).contains(&whole), "{victim}: {summary}");
     let out = folder.path().join("out.mcap");
@@ -84,7 +86,8 @@ fn kill_and_watch(victim: &str) {
     );
 }
 
-/// On every link all that was emitted was received or dropped; how much was dropped in all.
+/// Asserts that on every link the emitted samples equal the received plus the dropped ones; returns the number
+/// dropped in total.
 fn books_balance(summary: &serde_json::Value) -> u64 {
     let mut lost = 0;
     for link in summary["links"].as_array().unwrap() {
@@ -166,7 +169,7 @@ fn what_a_killed_run_leaves_is_removed_by_the_next_one_and_what_lives_is_not() {
         !ids.iter().any(|&id| is_alive(id))
     });
     assert!(left(&killed).len() > 1, "{:?}", left(&killed));
-    // As if a minute had passed.
+    // Simulates that a minute has passed.
     let folder_of = left(&killed)
         .into_iter()
         .find(|path| path.starts_with("/tmp"));

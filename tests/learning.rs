@@ -1,7 +1,7 @@
 //! A request for learning reaches the virtual collision sensor of a pipeline that runs, what it learns is there for the
 //! next run, and the archive replays as the run went.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! Tests of the whole program, a file for each subject.
 //!
-//! They are one test program: each test program is linked with all of tauscope, which takes seconds, and in one the
-//! tests that wait run beside those that compute.
+//! They are one test program, because linking tauscope takes seconds per program. Also, tests that wait run in
+//! parallel with tests that compute.
 
 mod archives;
 mod bad_input;

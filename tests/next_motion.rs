@@ -1,7 +1,7 @@
-//! What explain cannot tell apart, the motion that it proposes next does: an arm with one member of a class
+//! The motion that explain proposes distinguishes the alternatives of its report: an arm with one member of a class
 //! moves poorly, then as proposed.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::Path;
 
@@ -26,7 +26,7 @@ fn simulate(folder: &Path, seed: u64, physics: &Value, recordings: &Value) {
     assert_eq!(out.code, 0, "{}", out.stderr);
 }
 
-/// What explain says of the recordings in `fit`.
+/// Report of explain on the recordings in `fit`.
 fn explain(folder: &Path, fit: &[&str], out: &str) -> Value {
     let recording = |name: &str| folder.join(format!("{name}.mcap"));
     let mut explain = tauscope();
@@ -41,7 +41,7 @@ fn explain(folder: &Path, fit: &[&str], out: &str) -> Value {
     serde_json::from_str(&std::fs::read_to_string(report).unwrap()).unwrap()
 }
 
-/// The one finding: its effect, its joint, and how many rivals it has.
+/// The only finding: its effect, its joint, and the number of alternatives.
 fn found(report: &Value) -> (&str, &str, usize) {
     let findings = report["findings"].as_array().unwrap();
     assert_eq!(findings.len(), 1, "{findings:?}");
@@ -50,7 +50,8 @@ fn found(report: &Value) -> (&str, &str, usize) {
     (text("effect"), text("joint"), rivals.len())
 }
 
-/// The motion proposed for an arm with this physics, after small strokes of these harmonics, splits the class.
+/// Asserts that the motion proposed for an arm with this physics, after small strokes of these harmonics, splits the
+/// class.
 fn splits(physics: &Value, range: f64, harmonics: u32) {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
@@ -99,7 +100,7 @@ fn a_spring_is_told_from_an_offset() {
 
 #[test]
 fn a_gain_is_told_from_an_offset_and_a_mass() {
-    // Far beyond what masses that are a little off do.
+    // Far beyond the effect of slightly wrong masses.
     let gain = json!({"effect": "torque_gain", "joint": "joint2", "parameters": {"gain": 1.4}});
     splits(&gain, 0.15, 3);
 }

@@ -1,6 +1,6 @@
-//! What is odd about a labelled set: refused at its place, or evaluated and noted; never passed over.
+//! Irregularities of a labelled set: refused with their place, or evaluated with a note; never silently ignored.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 const LIGHT: [&str; 2] = ["--detectors", "naive_difference,twin_regression"];
 
-/// Evaluates `set`, which must go well.
+/// Evaluates `set`, which must succeed.
 fn summary(set: &Set, folder: &Path, detectors: &str) -> Value {
     let more = ["--json", "--detectors", detectors];
     let out = evaluate(&set.write(folder), &folder.join("out"), &more);
@@ -42,7 +42,7 @@ fn with(more: &'static str) -> Set {
     }
 }
 
-/// A set whose labels are these.
+/// A set with these labels.
 fn labelled(folder: &Path, recordings: &str) -> Set {
     let text = format!(r#"{{"recordings": {{{recordings}}}}}"#);
     Set {

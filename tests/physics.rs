@@ -1,6 +1,6 @@
 //! `tauscope physics` and `tauscope weeks`: a night's numbers, and what weeks of them say.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::Path;
 

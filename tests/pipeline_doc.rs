@@ -1,6 +1,6 @@
 //! The pipelines in `docs/pipeline.md`, `docs/publish.md` and `docs/fleet.md` are good ones.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use crate::common::{Out, bundled, root, write};
 

@@ -1,6 +1,7 @@
-//! Stages that share a process: the same result as apart, and one cell's failure is its own.
+//! Stages that share a process: same result as in separate processes, and the failure of one cell does not affect
+//! others.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -29,7 +30,7 @@ stages:
     write(&folder.join("pipeline.yaml"), &text);
 }
 
-/// Every stage in a process of its own.
+/// Puts every stage into a process of its own.
 fn apart(folder: &Path) {
     let file = folder.join("pipeline.yaml");
     let mut text = std::fs::read_to_string(&file).unwrap();
@@ -40,7 +41,7 @@ fn apart(folder: &Path) {
     write(&file, &text);
 }
 
-/// By topic, what it holds: time and bytes of each message. Health reports tell of samples that were on their way.
+/// Messages by topic: time and bytes. Health reports are left out, because they count samples in transit.
 fn topics(archive: &Path) -> BTreeMap<String, Vec<(u64, Vec<u8>)>> {
     let bytes = std::fs::read(archive).unwrap();
     let mut topics: BTreeMap<String, Vec<_>> = BTreeMap::new();
@@ -53,7 +54,7 @@ fn topics(archive: &Path) -> BTreeMap<String, Vec<(u64, Vec<u8>)>> {
             .push(one);
     }
     for messages in topics.values_mut() {
-        // Of two detectors on one topic the order is that of arrival.
+        // Two detectors on one topic are in the order of arrival.
         messages.sort();
     }
     topics.retain(|topic, _| !topic.contains("health") && !topic.contains("diagnostics"));
@@ -115,7 +116,7 @@ fn a_killed_process_comes_back_with_all_its_stages() {
     let again = live.wait_for_stage("ingest");
     assert!(again != ids[0] && is_alive(again) && is_alive(recorder));
     let (code, summary) = live.end();
-    // What was on its way out of the process died with it, and that is said.
+    // Samples in transit from the process are lost with it, and the loss is reported.
     let count = |link: &serde_json::Value, key: &str| link[key].as_u64().unwrap();
     let mut lost = 0;
     for link in summary["links"].as_array().unwrap() {
@@ -146,7 +147,7 @@ fn a_cell_that_fails_leaves_the_others_of_its_process_alone() {
             recording = data.join("demo.mcap").display()
         )
     };
-    // Its file cannot be written: it fails a minute into the stream at the latest, and at its end.
+    // Its file cannot be written: it fails after at most a minute of the stream, and at its end.
     let bias = "[1, 1, 1, 1, 1, 1, 1]";
     let bad = format!(
         "virtual_collision_sensor: {{bias: {bias}, learn: at_start, learning_s: 1, state: {}}}",
@@ -163,7 +164,7 @@ stages:
         robot = data.join("demo_arm.urdf").display(),
     );
     write(&folder.path().join("pipeline.yaml"), &text);
-    // A file in the place of the folder.
+    // A file in place of the folder.
     write(&folder.path().join("no"), "");
     let mut live = Live::start(folder.path(), &[]);
     let good = live.wait_for_stage("good_in");
@@ -218,13 +219,13 @@ recordings:
     signal(recorder, "STOP");
     let before = received(&mut live, "two");
     std::thread::sleep(Duration::from_secs(8));
-    // Older lines wait to be heard.
+    // Older lines of the output must be read first.
     let mut during = received(&mut live, "two");
     for _ in 0..3 {
         during = received(&mut live, "two").max(during);
     }
     signal(recorder, "CONT");
-    // More than the link itself has room for.
+    // More than the capacity of the link itself.
     assert!(during > before + 4_000, "{before}, then {during}");
     signal(live.id(), "INT");
     let (code, summary) = live.end();
@@ -234,7 +235,8 @@ recordings:
     }
 }
 
-/// What a stage has received, by the next line that tells how it goes: `4 s: ingest 2000 (500 Hz, ...); twin ...`.
+/// Number of samples that a stage has received, from the next progress line:
+/// `4 s: ingest 2000 (500 Hz, ...); twin ...`.
 fn received(live: &mut Live, stage: &str) -> u64 {
     let line = live.wait_for_part(&format!("; {stage} "));
     let (_, rest) = line.split_once(&format!("; {stage} ")).unwrap();

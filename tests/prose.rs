@@ -1,6 +1,6 @@
 //! The Markdown texts: lines that an editor shows whole, and links that lead somewhere.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::{Path, PathBuf};
 

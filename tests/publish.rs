@@ -1,6 +1,6 @@
-//! What a whole pipeline tells its cell, and what it is told: commands, a ROS 2 side and a PLC of PyPI packages.
+//! A whole pipeline's outputs to its cell and commands from it, with a ROS 2 side and a PLC made of PyPI packages.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::io::{BufRead as _, BufReader};
 use std::net::TcpListener;
@@ -15,7 +15,7 @@ use crate::common::{Out, bundled, root, skipped, tauscope, write};
 use serde_json::Value;
 use tauscope_archive::{Recording, ros};
 
-/// The bundled recording, twice as fast, through all stages; commands come in at `commands`.
+/// The bundled recording at double speed through all stages; the port `commands` accepts commands.
 fn pipeline(folder: &Path, commands: u16, publish: &str, tool: &str) {
     let data = bundled();
     let data = data.display();
@@ -34,7 +34,7 @@ fn pipeline(folder: &Path, commands: u16, publish: &str, tool: &str) {
     );
 }
 
-/// A port that nobody listens on right now.
+/// A port without a listener.
 fn port() -> u16 {
     let free = TcpListener::bind("127.0.0.1:0").unwrap();
     free.local_addr().unwrap().port()
@@ -46,7 +46,7 @@ fn send(folder: &Path, arguments: &[&str]) -> Out {
     Out::answer(["send"].iter().chain(arguments).chain(&file))
 }
 
-/// Sends once the pipeline is there: a slow machine takes its time to start it.
+/// Sends a command, repeating it until the pipeline has started, which takes time on a slow machine.
 fn send_at_last(folder: &Path, arguments: &[&str]) -> Out {
     let deadline = Instant::now() + Duration::from_mins(1);
     loop {
@@ -57,7 +57,7 @@ fn send_at_last(folder: &Path, arguments: &[&str]) -> Out {
     }
 }
 
-/// The stamp from which a command holds.
+/// Stamp of the first sample to which a command applies.
 fn stamp(out: &Out) -> i64 {
     assert_eq!(out.code, 0, "{}", out.stderr);
     let answer: Value = serde_json::from_str(&out.stdout).unwrap();
@@ -119,7 +119,7 @@ fn a_command_holds_from_the_stamp_that_was_answered_live_and_in_a_replay() {
             vec![],
         ),
     ];
-    // The terminal tells them, too.
+    // The terminal shows them, too.
     for words in [
         "label: new gripper",
         "alarms muted for 0.3 s",
@@ -139,7 +139,7 @@ fn a_command_holds_from_the_stamp_that_was_answered_live_and_in_a_replay() {
     });
     assert_eq!(commands(&live), expected);
 
-    // The archive, replayed, is told the same at the same samples, and computes the same.
+    // A replay of the archive gets the same commands at the same samples, and gives the same results.
     let replay = |into: &str| {
         let mut replay = tauscope();
         replay
@@ -160,7 +160,7 @@ fn a_command_holds_from_the_stamp_that_was_answered_live_and_in_a_replay() {
     assert_eq!(messages(&first, "/residual"), messages(&live, "/residual"));
     assert_eq!(onsets(&first), onsets(&live));
 
-    // From the sample with the answered stamp on the twin carries the payload, and not before.
+    // The twin carries the payload from the sample with the answered stamp on, and not before.
     let plain = replay_without_commands(folder);
     let payload_ns = expected[2].0;
     let differs = |at: &usize| plain[*at].1.effort != twin[*at].1.effort;
@@ -168,7 +168,7 @@ fn a_command_holds_from_the_stamp_that_was_answered_live_and_in_a_replay() {
     assert_eq!(twin[first_other].0, payload_ns);
 }
 
-/// The twin's effort for the bundled recording, which nobody told anything.
+/// The twin's effort for the bundled recording without commands.
 fn replay_without_commands(folder: &Path) -> Vec<(i64, ros::JointState)> {
     let mut replay = tauscope();
     let recording = bundled().join("demo.mcap");
@@ -202,7 +202,11 @@ fn what_cannot_be_told_is_refused_with_the_reason() {
             2,
             "the pipeline has no cell `dem`",
         ),
-        (&["learn"], 1, "nobody takes commands for the cell `demo`"),
+        (
+            &["learn"],
+            1,
+            "no source accepts commands for the cell `demo`",
+        ),
     ] {
         let out = send(folder, arguments);
         assert_eq!(out.code, code, "{arguments:?}: {}", out.stderr);
@@ -210,7 +214,7 @@ fn what_cannot_be_told_is_refused_with_the_reason() {
     }
     let _run = Live::start(folder, &[]);
     assert_eq!(send_at_last(folder, &["label", "it runs"]).code, 0);
-    // By the endpoint instead of the file; the source itself refuses.
+    // With the endpoint instead of the file; the source itself refuses the command.
     let endpoint = format!("tcp/127.0.0.1:{at}");
     let arguments = [
         "send",
@@ -237,7 +241,7 @@ fn a_publisher_that_cannot_work_is_refused_before_anything_starts() {
     for (publish, why) in [
         (
             "inputs: [ingest, detect], publish: {}",
-            "a publisher that tells nobody",
+            "the publisher has no output",
         ),
         (
             "inputs: [ingest, twin], publish: {modbus: {}}",
@@ -290,7 +294,7 @@ fn a_detector_in_python_finds_contacts_too() {
     let onsets = lines
         .map_while(Result::ok)
         .filter(|line| line.contains("onset"));
-    // It prints one line for each onset; three are enough to see that it judges what it hears.
+    // It prints one line for each onset; three are sufficient to show that it processes the residuals.
     let stamps: Vec<i64> = onsets
         .take(3)
         .map(|line| line.split(' ').next().unwrap().parse().unwrap())
@@ -303,7 +307,7 @@ fn a_detector_in_python_finds_contacts_too() {
 const ROS_SIDE: [&str; 2] = ["eclipse-zenoh==1.10.2", "rosbags==0.11.9"];
 const PLC: [&str; 1] = ["pymodbus==3.16.1"];
 
-/// A helper that is ended whatever happens.
+/// A helper process that is ended in any case.
 struct Helper(Child);
 
 impl Drop for Helper {
@@ -322,7 +326,7 @@ impl Helper {
         Self(command.stdout(Stdio::piped()).spawn().unwrap())
     }
 
-    /// The last line that it printed, as JSON, once it has ended.
+    /// Waits for its end; returns the last line of its output as JSON.
     fn result(&mut self, mut rest: impl std::io::Read) -> Value {
         let mut text = String::new();
         rest.read_to_string(&mut text).unwrap();
@@ -356,7 +360,7 @@ fn a_ros_2_side_gets_every_contact() {
     assert_eq!(code, 0, "{summary:#}");
     let heard = side.result(heard);
 
-    // Six pushes, as the recorder of the same run has them.
+    // Six pushes, as in the archive of the same run.
     let onsets = onsets(&folder.join("x.mcap"));
     assert!(onsets.len() >= 6, "{onsets:?}");
     assert_eq!(heard["onsets"], serde_json::json!(onsets));

@@ -1,6 +1,6 @@
 //! The Python module: the wheel is built by maturin, installed, and tested from Python; the example notebook runs.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::Path;
 use std::process::Command;

@@ -1,6 +1,6 @@
 //! Recordings of real arms, where they are at hand: what others computed from them must come out.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! No command takes the place of a file that it did not make in this run, unless it is told to.
+//! No command overwrites a file that it did not create in this run, except with `--force`.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::ffi::OsString;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::common::{Out, bundled, write};
 
-/// Runs a command twice, then with `--force`; `named` is in what the second one says.
+/// Runs a command twice, then with `--force`; the output of the second run must contain `named`.
 fn twice(arguments: &[&str], out: &Path, named: &[&str]) {
     let all = |more: &[&str]| -> Vec<OsString> {
         let words = arguments.iter().chain(more).map(OsString::from);
@@ -25,7 +25,7 @@ fn twice(arguments: &[&str], out: &Path, named: &[&str]) {
     assert_eq!(forced.code, 0, "{arguments:?}: {forced:?}");
 }
 
-/// Name, time and length of each file.
+/// Name, time of modification and length of each file.
 fn contents(out: &Path) -> Vec<(OsString, std::time::SystemTime, u64)> {
     if out.is_file() {
         let file = out.metadata().unwrap();
@@ -85,7 +85,7 @@ fn a_second_run_into_one_place_is_refused() {
         &at("explained"),
         &["report.json", "b.csv"],
     );
-    // The name of a motion to record next is known to the explanation alone.
+    // Only the explanation knows the name of a motion to record next.
     std::fs::create_dir(at("moved")).unwrap();
     write(&at("moved/next_viscous_joint1.csv"), "0,0\n");
     let moved = at("moved").display().to_string();

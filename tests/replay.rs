@@ -1,7 +1,6 @@
-//! Replay of the bundled recording: what is found, that it is the same every time, and that old
-//! archives can be gone through anew.
+//! Replay of the bundled recording: its contacts, reproducibility, and replay of older archives.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -27,7 +26,7 @@ fn pipeline(folder: &Path, detectors: &[&str]) -> PathBuf {
     write(&folder.join("pipeline.yaml"), &text)
 }
 
-/// The events that `tauscope replay --json` tells of the first recording's detector.
+/// Events of the first recording's detector from `tauscope replay --json`.
 fn events(out: &Out, detector: &str) -> Vec<serde_json::Value> {
     let summary: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
     let detectors = summary[0]["detectors"].as_array().unwrap();
@@ -134,7 +133,7 @@ fn the_live_run_finds_what_the_replay_finds() {
         "nothing may be lost:\n{}{}",
         run.stdout, run.stderr
     );
-    // The run's archive, its detections kept out of it: gone through anew it must say the same.
+    // The run's archive without its detections: replaying it must give the same.
     let again = replay(
         &file,
         &folder.path().join("run.mcap"),
@@ -145,7 +144,7 @@ fn the_live_run_finds_what_the_replay_finds() {
         events(&again, "twin_regression"),
         events(&replayed, "twin_regression")
     );
-    // And what the run itself recorded as detections is what the replay recorded.
+    // The detections recorded by the run equal those recorded by the replay.
     let detections = |path: PathBuf| {
         let recording = tauscope_archive::Recording::open(&path).unwrap();
         let mut messages = recording.messages(&["/detections"]).unwrap();
@@ -178,7 +177,7 @@ fn a_new_detector_goes_through_an_old_archive_with_the_twin_kept_or_computed_ane
         let again = replay(&new, &archive, &out, &["--twin", twin]);
         assert_eq!(again.code, 0, "{}", again.stderr);
         assert!(out.join("demo.mcap").exists());
-        // The detector that is new has judged it, and the old one says what it said.
+        // The new detector has judged it, and the old one gives the same result.
         events(&again, "naive_difference");
         let onsets = |out: &Out| -> Vec<f64> {
             events(out, "twin_regression")

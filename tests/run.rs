@@ -1,4 +1,4 @@
-//! `tauscope run`: stages as processes, their end in order, and what is said of it.
+//! `tauscope run`: stages as processes, their normal end, and the reports.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::common::live::{Live, is_alive, signal, stage, wait_until};
 use crate::common::{Out, bundled, tauscope, write};
 
-/// The bundled recording at this rate through everything, into `out.mcap`.
+/// The bundled recording at this rate through all stages, into `out.mcap`.
 fn pipeline(folder: &Path, rate: &str) {
     let data = bundled();
     let text = format!(
@@ -200,7 +200,7 @@ fn an_interrupt_ends_the_source_and_the_rest_finishes() {
 fn nothing_outlives_a_supervisor_that_is_killed() {
     let folder = tempfile::tempdir().unwrap();
     pipeline(folder.path(), "realtime");
-    // A program that listens to nothing, not even to the end of its standard input.
+    // A program that ignores everything, even the end of its standard input.
     let mut text = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
     text += "- {name: deaf, outside: {command: [sleep, \"1000\"], output: joint_state}}\n";
     write(&folder.path().join("pipeline.yaml"), &text);
@@ -218,7 +218,7 @@ fn nothing_outlives_a_supervisor_that_is_killed() {
     wait_until("all stages have gone", || {
         !stages.iter().any(|&id| is_alive(id))
     });
-    // What had been recorded is whole.
+    // The recording up to this point is complete.
     info(&folder.path().join("out.mcap"));
 }
 
@@ -227,7 +227,7 @@ fn a_stage_that_cannot_begin_fails_the_run() {
     let folder = tempfile::tempdir().unwrap();
     pipeline(folder.path(), "fast");
     let text = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
-    // No file can have so long a name, which only who makes it finds out.
+    // The file name is too long, which is detected only when the file is created.
     let name = format!("mcap: {}.mcap", "a".repeat(300));
     let text = text.replace("mcap: out.mcap", &name);
     write(&folder.path().join("pipeline.yaml"), &text);

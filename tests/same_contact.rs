@@ -1,5 +1,5 @@
-//! Terminal, archive and picture tell the same of each contact of the bundled recording, and its force is that of the
-//! label.
+//! Terminal, archive and picture report the same values for each contact of the bundled recording, and the force
+//! agrees with the label.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use rerun::log::{Chunk, LogMsg};
 use tauscope_archive::Recording;
 use tauscope_archive::ros::{DiagnosticArray, JointState, WrenchStamped};
 
-/// A contact that is over, as one of the outputs tells it.
+/// A finished contact in one of the outputs.
 #[derive(Debug, Clone, PartialEq)]
 struct Told {
     duration_s: String,
@@ -22,7 +22,7 @@ struct Told {
     link: String,
 }
 
-/// A detector, the twin that it stands behind, and its part of the pipeline file; `{data}` is the bundled folder.
+/// A detector, its twin, and its part of the pipeline file; `{data}` is the bundled folder.
 const DETECTORS: [(&str, &str, &str); 2] = [
     (
         "tauscope",
@@ -36,7 +36,7 @@ const DETECTORS: [(&str, &str, &str); 2] = [
     ),
 ];
 
-/// The bundled recording as fast as it goes, in a folder of its own; what was said on the terminal.
+/// Runs the bundled recording at full speed in a folder of its own; returns the terminal output.
 fn run(folder: &Path, (_, twin, detect): (&str, &str, &str)) -> String {
     let data = bundled();
     let text = format!(
@@ -200,7 +200,7 @@ fn start_of_recording_s() -> f64 {
     first.header.stamp.ns() as f64 * 1e-9
 }
 
-/// Force, direction, link and times against what pushed.
+/// Asserts that force, direction, link and times agree with the labels.
 fn is_that_of_the_label(contacts: &[&Values]) {
     let labels = std::fs::read_to_string(bundled().join("labels.json")).unwrap();
     let labels: serde_json::Value = serde_json::from_str(&labels).unwrap();

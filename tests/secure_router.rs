@@ -1,5 +1,5 @@
-//! The router file that `deploy/zenoh/secure.sh` writes, in a real router with live sessions: who holds which
-//! certificate decides who is heard.
+//! The router file that `deploy/zenoh/secure.sh` writes, in a real router with live sessions: a session's certificate
+//! determines the messages that the router forwards.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use crate::common::{live, robot};
@@ -11,10 +11,10 @@ use zenoh::handlers::FifoChannelHandler;
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait as _};
 
-/// By then what is let through has come.
+/// Time within which a forwarded message arrives.
 const SOON: Duration = Duration::from_secs(10);
 
-/// Certificates for two cells, and the router that they meet at. Where there is no `openssl`, none.
+/// Certificates for two cells, and their router; `None` without `openssl`.
 fn router(folder: &Path, test: &str) -> Option<(Session, String)> {
     if Command::new("openssl").arg("version").output().is_err() {
         crate::common::skipped(test, "openssl is absent");
@@ -23,7 +23,7 @@ fn router(folder: &Path, test: &str) -> Option<(Session, String)> {
     secure(folder);
     let mut config = zenoh::Config::from_file(folder.join("router.json5")).unwrap();
     let endpoint = robot::endpoint().replace("tcp/", "tls/");
-    // The file names them as they are beside it; this test runs elsewhere.
+    // The file's paths are relative to its own folder, and this test runs in another one.
     for key in [
         "root_ca_certificate",
         "listen_private_key",
@@ -51,7 +51,7 @@ fn secure(folder: &Path) {
     assert!(made.status.success(), "{made:?}");
 }
 
-/// The endpoint as the file of a pipeline has it, with the certificate `name` of that folder.
+/// Endpoint of a pipeline file, with the certificate `name` of that folder.
 fn with_certificate(endpoint: &str, folder: &Path, name: &str) -> String {
     let file = |name: String| folder.join(name).display().to_string();
     format!(
@@ -116,7 +116,7 @@ fn a_cell_speaks_and_hears_under_its_own_name_only() {
     let one_hears = one.declare_subscriber("press-1/**").wait().unwrap();
     std::thread::sleep(Duration::from_secs(1));
 
-    // The stranger's word comes first, so its absence is not its lateness.
+    // The forged message is sent first, so it would arrive before the other one if it were forwarded.
     two.put("press-1/status", "forged").wait().unwrap();
     two.put("press-2/status", "second").wait().unwrap();
     let heard = next(&fleet_hears, "");
@@ -126,7 +126,7 @@ fn a_cell_speaks_and_hears_under_its_own_name_only() {
     assert_eq!(heard.payload().try_to_string().unwrap(), "first");
     let heard = next(&one_hears, "press-1");
     assert_eq!(heard.payload().try_to_string().unwrap(), "first");
-    // Whatever it asks for, another cell hears none of it; what it said itself it hears without the router.
+    // Another cell receives none of it, whatever it subscribes to. Its own messages do not pass through the router.
     let mut overheard = Vec::new();
     while let Some(sample) = two_hears.recv_timeout(Duration::from_secs(1)).unwrap() {
         overheard.push(sample.payload().try_to_string().unwrap().into_owned());
@@ -191,7 +191,7 @@ fn who_has_no_certificate_of_the_plant_does_not_get_in() {
     assert!(client(&endpoint, folder, Some((folder, "press-1"))).is_ok());
 }
 
-/// A cell that publishes at that endpoint; what it says of it.
+/// Runs a cell that publishes at that endpoint; returns its output.
 fn said_of(endpoint: &str, folder: &Path) -> String {
     let data = crate::common::bundled();
     let data = data.display();
@@ -216,7 +216,7 @@ fn a_session_that_cannot_open_is_told_with_its_reason() {
     let folder = folder.path();
     let nobody = robot::endpoint();
     let said = said_of(&nobody, folder);
-    assert!(said.contains("nobody answers there"), "{said}");
+    assert!(said.contains("no answer there"), "{said}");
     let Some((_router, endpoint)) = router(folder, test) else {
         return;
     };
@@ -234,7 +234,7 @@ fn a_session_that_cannot_open_is_told_with_its_reason() {
     assert!(said.contains("lets no session open"), "{said}");
 }
 
-/// A cell on two hosts that meet at that router; the second one shows the certificate `desk`.
+/// Runs a cell on two hosts with that router; the second one uses the certificate `desk`.
 fn two_hosts(endpoint: &str, folder: &Path, desk: &str) -> (live::Live, live::Live) {
     let data = crate::common::bundled();
     let data = data.display();

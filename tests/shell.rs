@@ -1,4 +1,4 @@
-//! What a shell and `man` are given.
+//! Completions for shells and manual pages.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::process::Command;
@@ -17,7 +17,7 @@ fn commands() -> Vec<String> {
         .collect()
 }
 
-/// What bash completes `typed` to.
+/// Completions of `typed` by bash.
 fn completed(script: &str, typed: &str) -> Vec<String> {
     let words: Vec<&str> = typed.split(' ').collect();
     let (last, before) = (words[words.len() - 1], words[words.len() - 2]);
@@ -62,7 +62,7 @@ fn every_command_has_a_manual_page() {
         let page = std::fs::read_to_string(out.join(format!("tauscope-{command}.1"))).unwrap();
         assert!(page.contains(".SH SYNOPSIS"), "{command}");
     }
-    // The program's own, and none for what only the program calls.
+    // The program's own page and one per command, none for internal commands.
     assert_eq!(std::fs::read_dir(&out).unwrap().count(), commands.len() + 1);
 }
 
@@ -85,7 +85,7 @@ fn a_program_that_is_built_apart_and_is_not_there_is_told_with_what_builds_it() 
         });
         assert_eq!(out.code, 2, "{out:?}");
         assert!(out.stderr.contains(&format!("-p {program}")), "{out:?}");
-        // What it is for is told without it.
+        // Its purpose is documented even if the other program is missing.
         let mut asked = crate::common::tauscope();
         asked.arg(command).arg("--help").env("PATH", empty.path());
         let help = Out::of(asked);

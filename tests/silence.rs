@@ -1,4 +1,4 @@
-//! A live pipeline that gets nothing says so within seconds, with what is there instead and the likeliest slip.
+//! A live pipeline without data warns within seconds, with the topics that exist instead and the likeliest mistake.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::path::Path;
@@ -9,8 +9,8 @@ use crate::common::robot::{JOINTS, Publisher, endpoint, rmw_key, rmw_token, rout
 use crate::common::{bundled, write};
 use zenoh::Wait as _;
 
-/// Within this time of the start something must be said. The program promises 5 s of its own; the tests run side by
-/// side on a machine that may be busy.
+/// Time after the start within which a warning must appear. The program promises 5 s; the tests run in parallel on a
+/// machine that may be busy.
 const PROMISED: Duration = Duration::from_secs(10);
 
 /// The bundled robot, live: `zenoh` are the source's further settings.
@@ -27,7 +27,7 @@ stages:
     write(&folder.join("pipeline.yaml"), &text);
 }
 
-/// Everything that was said until the run ended, and how it ended.
+/// All output until the end of the run, with exit code and summary.
 fn said_until_the_end(mut live: Live) -> (String, i32, serde_json::Value) {
     live.wait_for("error: stage `ingest` gave no usable sample within 1 s");
     let mut said = live.rest();
@@ -130,8 +130,8 @@ fn a_router_that_cannot_be_reached_is_told_from_one_with_nobody_behind_it() {
 
     let session = router(&endpoint);
     let told = live.wait_for("warning: stage `ingest`: no usable sample for ");
-    assert!(told.contains("nobody publishes 0/joint_states/"), "{told}");
-    live.wait_for("  likely: 1 Zenoh peer is connected, but nobody publishes anything");
+    assert!(told.contains("no publisher of 0/joint_states/"), "{told}");
+    live.wait_for("  likely: 1 Zenoh peer is connected, but nothing is published");
 
     let token = session
         .liveliness()
@@ -146,7 +146,7 @@ fn a_router_that_cannot_be_reached_is_told_from_one_with_nobody_behind_it() {
     drop(token);
     signal(live.id(), "INT");
     let (code, summary) = live.end();
-    // Nothing was watched and nothing recorded.
+    // No sample was detected or recorded.
     assert_eq!(code, 1, "{summary}");
     assert_eq!(summary["ended"], "interrupted");
 }
@@ -160,7 +160,7 @@ fn a_publisher_that_stops_and_comes_back_is_told_of() {
     let publisher = Publisher::start(&session, &key, &JOINTS);
     pipeline(folder.path(), &endpoint, "");
     let mut live = Live::start(folder.path(), &[]);
-    // How it goes, as a journal has it.
+    // Progress line, as in a journal.
     let line = live.wait_for_part(" s: ingest ");
     assert!(line.contains(" Hz, last 0."), "{line}");
     drop(publisher);
@@ -198,7 +198,7 @@ fn a_second_publisher_of_the_same_joints_is_told_of_and_not_heard() {
     live.wait_for("  likely: the driver was started twice");
     signal(live.id(), "INT");
     let (code, summary) = live.end();
-    // What was not heard is counted.
+    // Samples that were not received are counted.
     assert_eq!(code, 3, "{summary}");
     assert!(stage(&summary, "ingest")["dropped"].as_u64() > Some(0));
 }

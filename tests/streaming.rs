@@ -1,7 +1,7 @@
-//! What `evaluate` says of a recording a pipeline says, too: one that runs its `twin.yaml` and `learnt.yaml`, all
-//! detectors side by side.
+//! A pipeline with the `twin.yaml` and `learnt.yaml` of `evaluate` gives the same events as `evaluate`, with all
+//! detectors in parallel.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::common::learnt_pipeline::{LearntPipeline, replay};
 use crate::common::{Out, bundled, tauscope, write};
 use serde_json::Value;
 
-/// The events of a replay, by detector, and those that `evaluate` wrote.
+/// Events of a replay, by detector, and those that `evaluate` wrote.
 fn both(replayed: &Out, evaluated: &Path, recording: &str) -> Vec<(String, Value, Value)> {
     assert_eq!(replayed.code, 0, "{}", replayed.stderr);
     let summary: Value = serde_json::from_str(&replayed.stdout).unwrap();
@@ -28,8 +28,8 @@ fn both(replayed: &Out, evaluated: &Path, recording: &str) -> Vec<(String, Value
     both.collect()
 }
 
-/// Replays a set's test recording through a pipeline of what its evaluation left in `out`: so many detectors must find the same, and
-/// something.
+/// Replays a set's test recording through a pipeline with the evaluation's results in `out`: the given number of
+/// detectors must find the same events, and at least one.
 fn finds_in_a_pipeline_what_was_found(
     folder: &Path,
     set: &Set,
@@ -52,7 +52,7 @@ fn finds_in_a_pipeline_what_was_found(
     }
 }
 
-/// What a validation recording has taught stands in `learnt.yaml`, and nothing else is carried over from it.
+/// `learnt.yaml` holds the parameters learnt from a validation recording; no other state is carried over from it.
 #[test]
 fn a_pipeline_of_what_was_learnt_finds_what_evaluate_found() {
     let detectors = "naive_difference,twin_regression,momentum_observer,virtual_collision_sensor_basic,\
@@ -72,7 +72,7 @@ fn a_pipeline_of_what_was_learnt_finds_what_evaluate_found() {
     }
 }
 
-/// The same of those that need collisions, cooperations and a high rate.
+/// Detectors that need collisions, cooperations and a high rate.
 #[test]
 fn the_classifiers_find_in_a_pipeline_what_they_found_in_evaluate() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Counts what ARCHITECTURE.md says of the code's structure.
+"""Counts imports against the order of rooms, circles of imports, long files and long functions.
+
+The reasons are in docs/decisions/0010-folders-follow-the-method.md.
 
     python3 tests/structure.py                  the work tree
     python3 tests/structure.py --at COMMIT      a commit
@@ -336,7 +338,7 @@ def quoted(text, code, effect):
 
 
 def main():
-    arguments = argparse.ArgumentParser(description="Counts what ARCHITECTURE.md says of the code's structure.")
+    arguments = argparse.ArgumentParser(description="Counts imports against the order of rooms, circles, long files and functions.")
     arguments.add_argument("--at", metavar="COMMIT")
     arguments.add_argument("--check", action="store_true")
     arguments.add_argument("--list", action="store_true")

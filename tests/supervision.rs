@@ -1,4 +1,5 @@
-//! How a run is looked after: who hangs is named, who may come back is said in the file, and a service manager is told.
+//! Supervision of a run: a hanging stage is named, the file sets the restart policy, and a service manager is
+//! notified.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::os::unix::net::UnixDatagram;
@@ -8,10 +9,10 @@ use std::time::{Duration, Instant};
 use crate::common::live::{Live, is_alive, signal, stage};
 use crate::common::{bundled, tauscope, write};
 
-/// Slow machines run the tests, too; nothing waits this long where all is well.
+/// Generous timeout for slow machines; normally never reached.
 const PATIENCE: Duration = Duration::from_mins(1);
 
-/// A source at the pace of its recording, a twin and a detector, each in a process of its own; `twin` has more keys.
+/// A source in real time, a twin and a detector, each in a process of its own; `twin` has further keys.
 fn pipeline(folder: &Path, twin: &str) {
     let data = bundled();
     let text = format!(
@@ -43,7 +44,7 @@ fn a_stage_that_hangs_is_named_and_goes_on() {
         "{line}"
     );
     signal(twin, "CONT");
-    live.wait_for("note: stage `twin` goes on");
+    live.wait_for("note: stage `twin` responds again");
     assert!(is_alive(twin), "it is the same process");
     signal(live.id(), "INT");
     let (_, summary) = live.end();
@@ -81,7 +82,7 @@ fn the_file_says_how_often_a_stage_comes_back() {
     assert_eq!(live.end().0, 1);
 }
 
-/// What a service manager hears.
+/// A simulated service manager.
 struct Manager(UnixDatagram);
 
 impl Manager {
@@ -93,7 +94,7 @@ impl Manager {
         Self(socket)
     }
 
-    /// What it is told next, within `wait`.
+    /// Next notification within `wait`.
     fn hears(&self, wait: Duration) -> Option<String> {
         let mut bytes = [0; 4096];
         let until = Instant::now() + wait;
@@ -135,7 +136,7 @@ fn a_service_manager_is_told_of_readiness_state_and_life() {
     manager.waits_for("STATUS=3 stages run");
     manager.waits_for("WATCHDOG=1");
 
-    // A stage that hangs is the run's own affair: it is told, and the run lives.
+    // A hanging stage does not end the run; it is reported, and the run stays alive.
     signal(twin, "STOP");
     manager.waits_for("STATUS=hang: twin");
     manager.waits_for("WATCHDOG=1");

@@ -1,6 +1,6 @@
 //! Two hosts of one pipeline file: on one machine over loopback, and in two network namespaces.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::net::TcpListener;
 use std::process::Command;

@@ -1,4 +1,4 @@
-//! The contacts of a recording are found when a controller of Universal Robots tells of them, as they are in the file.
+//! The contacts of a recording are found when a Universal Robots controller sends it, as in the file.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::path::Path;
@@ -13,7 +13,7 @@ use tauscope_archive::Recording;
 /// Contacts of the bundled recording.
 const CONTACTS: usize = 6;
 
-/// The bundled arm without its last joint, because such a controller has six, behind this source.
+/// The bundled arm without its last joint, because such a controller has six, with this source.
 fn pipeline(folder: &Path, source: &str) {
     let urdf = std::fs::read_to_string(bundled().join("demo_arm.urdf")).unwrap();
     let moving = r#"<joint name="joint7" type="revolute">"#;
@@ -33,7 +33,7 @@ stages:
     write(&folder.join("pipeline.yaml"), &text);
 }
 
-/// What a controller would have measured.
+/// Measured values of a controller, from the bundled recording.
 fn instants() -> Vec<Instant> {
     let recording = Recording::open(bundled().join("demo.mcap")).unwrap();
     let mut states = recording.joint_states("/joint_states").unwrap();
@@ -55,7 +55,7 @@ fn instants() -> Vec<Instant> {
     all
 }
 
-/// The lines that tell of contacts.
+/// Lines that report contacts.
 fn told(said: &[String]) -> Vec<String> {
     let told = said.iter().filter(|line| line.starts_with("[detect]"));
     told.cloned().collect()

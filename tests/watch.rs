@@ -1,6 +1,6 @@
 //! A watch in a pipeline: a step of friction in a simulated stream is named, in replay and live alike.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::Path;
 

@@ -24,7 +24,7 @@ struct BagFile {
     rosbag2_bagfile_information: BagInformation,
 }
 
-/// The keys of `metadata.yaml` that matter here; the files themselves know the rest better.
+/// The keys of `metadata.yaml` that are read; the files themselves are the better source for the others.
 #[derive(Deserialize)]
 struct BagInformation {
     #[serde(default)]
@@ -41,8 +41,8 @@ const METADATA: &str = "metadata.yaml";
 const MAX_METADATA_BYTES: u64 = 16 << 20;
 
 impl BagFolder {
-    /// Finds the files of the bag in `folder`: those that `metadata.yaml` lists, or where it cannot be used, those that
-    /// are in the folder.
+    /// Finds the files of the bag in `folder`: those that `metadata.yaml` lists, or if it cannot be used, those in
+    /// the folder.
     ///
     /// # Errors
     /// If the folder cannot be read or holds no such file, or the messages are compressed in an unknown format.
@@ -110,7 +110,7 @@ fn as_listed(
     }
 }
 
-/// The files that `metadata.yaml` lists, or in words why it cannot be used.
+/// Returns the files that `metadata.yaml` lists. The inner error is the reason why it cannot be used.
 ///
 /// # Errors
 /// If the messages are compressed in an unknown format.
@@ -144,7 +144,7 @@ fn listed(metadata: &Path) -> Result<Result<Vec<PathBuf>, String>, ArchiveError>
     Ok(Ok(bag.relative_file_paths))
 }
 
-/// The text of `metadata.yaml`, or in words why there is none.
+/// Returns the text of `metadata.yaml`, or the reason why it has none.
 fn text(metadata: &Path) -> Result<String, String> {
     let bytes = match std::fs::metadata(metadata) {
         Ok(file) => file.len(),
@@ -185,8 +185,8 @@ fn flaw(path: &Path, kind: DamageKind) -> Damage {
     }
 }
 
-/// The MCAP and SQLite files in `folder` by their name without the ending of a compressed file. Of a file that is there
-/// twice, the one that is not compressed.
+/// Returns the MCAP and SQLite files in `folder` by their name without the extension of a compressed file. If a file
+/// exists in both forms, the uncompressed one is returned.
 fn own_files(folder: &Path) -> Result<BTreeMap<OsString, PathBuf>, ArchiveError> {
     let mut own = BTreeMap::new();
     for entry in std::fs::read_dir(folder).map_err(ArchiveError::io(folder))? {

@@ -1,7 +1,7 @@
-//! The messages of a file that keeps them in chunks, one after the other.
+//! Sequential access to the messages of a chunked file.
 //!
-//! A chunk is loaded when its time has come and dropped when its last message has been given. At no time is more in
-//! memory than the chunks that overlap the current log time.
+//! A chunk is loaded when the cursor reaches its start time and dropped after its last message. Only the chunks that
+//! overlap the current log time are in memory.
 
 use crate::cursor::{Cursor, RawMessage};
 use crate::damage::{Damage, DamageKind};
@@ -9,23 +9,23 @@ use crate::error::ArchiveError;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-/// Longest chunk, packed or unpacked, and most unpacked chunks held at a time \[bytes\].
+/// Maximum size of a chunk, compressed or not, and of all decompressed chunks in memory \[bytes\].
 /// Resolution: bounds memory.
 pub(crate) const MAX_LOADED_BYTES: usize = 1 << 30;
 
-/// In which order messages come.
+/// Order in which messages are returned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Order {
-    /// By log time; of equal ones, the earlier in the file first.
+    /// By log time; messages of equal log time in file order.
     LogTime,
-    /// As they lie in the file.
+    /// In file order.
     File,
 }
 
-/// Where a chunk lies in its file, and in time.
+/// Position of a chunk in its file, and its time range.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
-    /// What its format calls it.
+    /// Index of the chunk, as passed to [`Chunks::load`].
     pub(crate) number: usize,
     pub(crate) at: u64,
     /// Log time of its first message.
@@ -38,11 +38,11 @@ pub(crate) struct Place {
 #[derive(Default)]
 pub(crate) struct Loaded {
     at: u64,
-    /// The records unpacked, or whatever the messages' places refer to.
+    /// Decompressed records, or another buffer that [`Entry::body_at`] refers to.
     pub(crate) records: Vec<u8>,
-    /// The wanted messages, as they lie in the chunk.
+    /// The selected messages, in file order until they are sorted by log time.
     pub(crate) messages: Vec<Entry>,
-    /// How many have been given.
+    /// Number of messages already returned.
     given: usize,
 }
 
@@ -57,13 +57,13 @@ pub(crate) struct Entry {
     pub(crate) body_len: usize,
 }
 
-/// A format that keeps messages in chunks.
+/// A file format that stores messages in chunks.
 pub(crate) trait Chunks: Send {
     /// The file.
     fn path(&self) -> &Path;
 
-    /// Fills `loaded`, which is cleared, with the chunk of this number. What of it cannot be read is told; if that is
-    /// all of it, there are no messages.
+    /// Loads the chunk `number` into `loaded`, which the caller has cleared. Returns the damage if a part of the
+    /// chunk cannot be read. If none of it can be read, `loaded` has no messages.
     ///
     /// # Errors
     /// If nothing more can be read from the file.
@@ -74,26 +74,26 @@ pub(crate) trait Chunks: Send {
     ) -> Result<Option<DamageKind>, ArchiveError>;
 }
 
-/// Over the chunks of a file.
+/// A [`Cursor`] over the chunks of a file.
 pub(crate) struct ChunkCursor<C> {
     chunks: C,
     order: Order,
-    /// In the order they are needed.
+    /// Sorted in the order of loading.
     places: Vec<Place>,
     next_place: usize,
     loaded: Vec<Loaded>,
-    /// Index into `loaded` of the message that was given last.
+    /// Index into `loaded` of the chunk with the current message.
     current: Option<usize>,
-    /// Log time of the message that was given last.
+    /// Log time of the last message returned.
     given_until_ns: Option<u64>,
-    /// Told before anything else is given.
+    /// Damage to report before the next message.
     damage: Option<Damage>,
-    /// Memory of chunks that are done with.
+    /// Buffers of a finished chunk, for reuse.
     spare: Option<Loaded>,
 }
 
 impl<C: Chunks> ChunkCursor<C> {
-    /// Over the chunks at `places`.
+    /// Creates a cursor over the chunks at `places`.
     pub(crate) fn new(chunks: C, order: Order, mut places: Vec<Place>) -> Self {
         places.sort_by_key(|place| match order {
             Order::LogTime => (place.start_ns, place.at),
@@ -112,7 +112,8 @@ impl<C: Chunks> ChunkCursor<C> {
         }
     }
 
-    /// Without the chunks that hold nothing of these log times \[ns since the epoch\]; those at the edges hold more.
+    /// Drops the chunks outside this range of log times \[ns since the epoch\]. Chunks at its edges also hold
+    /// messages outside it.
     pub(crate) fn within(mut self, within_ns: &RangeInclusive<i64>) -> Self {
         let of = |ns: i64| u64::try_from(ns).unwrap_or(0);
         let (from_ns, to_ns) = (of(*within_ns.start()), of(*within_ns.end()));
@@ -121,7 +122,7 @@ impl<C: Chunks> ChunkCursor<C> {
         self
     }
 
-    /// The loaded chunk whose next message comes first.
+    /// Returns the loaded chunk whose next message comes first, and the log time of that message.
     fn first(&self) -> Option<(usize, u64)> {
         let head = |loaded: &Loaded| loaded.messages[loaded.given];
         (0..self.loaded.len())
@@ -216,7 +217,7 @@ impl<C: Chunks> Cursor for ChunkCursor<C> {
     }
 }
 
-/// What stands for a length over the limit, in words.
+/// Describes a length over the limit.
 pub(crate) fn too_long(bytes: u64) -> String {
     format!("{bytes} bytes, the limit is {MAX_LOADED_BYTES}")
 }

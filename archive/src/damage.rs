@@ -1,63 +1,63 @@
-//! What of a recording cannot be read.
+//! Unreadable parts of a recording.
 
 use std::path::PathBuf;
 
 use serde::Serialize;
 
-/// A part of a recording that cannot be read, and what is known of it.
+/// An unreadable part of a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Damage {
     /// The file.
     pub path: PathBuf,
-    /// Where in the file it begins \[bytes from its start; the row for SQLite\].
+    /// Start of the damage in the file \[byte offset; row of a SQLite database; line of a CSV table\].
     pub at: u64,
-    /// What is wrong.
+    /// Kind of damage.
     #[serde(flatten)]
     pub kind: DamageKind,
     /// Log time of the last message that can be read before it, if any \[ns\].
     pub readable_until_ns: Option<i64>,
 }
 
-/// What is wrong with a part of a recording.
+/// Kind of damage to a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, thiserror::Error)]
 #[serde(tag = "damage", rename_all = "snake_case")]
 pub enum DamageKind {
-    /// The file ends before its end was written: its writer died, or it was cut. What follows
-    /// `at` is lost, except what a last chunk gives up to the tear.
+    /// A truncated file: its writer crashed, or the file was cut. Everything after [`Damage::at`] is lost, except the
+    /// messages recovered from an incomplete last chunk.
     #[error("the file is torn off here")]
     TornTail,
-    /// A chunk whose content cannot be trusted or unpacked. Its messages are lost.
+    /// A chunk whose content is corrupt or cannot be decompressed. Its messages are lost.
     #[error("a chunk cannot be read: {reason}")]
     Chunk {
-        /// Why.
+        /// Reason.
         reason: String,
-        /// Log time from which on messages are lost, as the chunk says \[ns\].
+        /// Log time of the first lost message, as declared by the chunk \[ns\].
         start_ns: Option<i64>,
-        /// Log time up to which \[ns\].
+        /// Log time of the last lost message, as declared by the chunk \[ns\].
         end_ns: Option<i64>,
     },
-    /// A record that makes no sense. Without an index, all that follows is lost.
+    /// A malformed record. Without an index, everything after it is lost.
     #[error("a record cannot be read: {reason}")]
     Record {
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// The index at the end of the file cannot be used. Nothing is lost: the data were read without.
+    /// An unusable index at the end of the file. Nothing is lost: the data were read without it.
     #[error("the index cannot be used, all data were read without it: {reason}")]
     Index {
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// A database fails while it is read. Rows from here on are lost.
+    /// A database that fails while it is read. Rows from here on are lost.
     #[error("the database cannot be read on: {reason}")]
     Database {
-        /// What SQLite says.
+        /// SQLite's error message.
         reason: String,
     },
-    /// A file that the bag lists is not there, or cannot be read from its start.
+    /// A file that the bag lists and that is missing, or unreadable from its start.
     #[error("a file of the bag is missing: {reason}")]
     File {
-        /// Why.
+        /// Reason.
         reason: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Why a recording cannot be read or written.
+//! Errors of reading and writing recordings.
 
 use std::path::{Path, PathBuf};
 
@@ -9,34 +9,34 @@ use crate::parquet_file::ParquetError;
 use crate::ros::{DecodeError, EncodeError};
 use crate::unreadable::UnreadableJointStates;
 
-/// Why a recording cannot be read or written.
+/// An error of reading or writing a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum ArchiveError {
-    /// The operating system refuses.
+    /// An I/O error.
     #[error("{}", of_io(path, source))]
     Io {
         /// The file.
         path: PathBuf,
-        /// What it says.
+        /// The operating system's error.
         source: std::io::Error,
     },
-    /// None of the formats that can be read.
+    /// A file or folder in none of the supported formats.
     #[error("{}: not a recording ({reason})", path.display())]
     UnknownFormat {
         /// The file or folder.
         path: PathBuf,
-        /// What was found instead.
+        /// Description of the content found instead.
         reason: String,
     },
-    /// Broken from its first record on.
+    /// A file that is corrupt from its first record on.
     #[error("{}: cannot be read from its first record: {reason}", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// There is a recording, but no message in it.
+    /// A recording without messages.
     #[error("{}: the recording is empty{}", path.display(), topics_hint(known))]
     Empty {
         /// The recording.
@@ -44,17 +44,17 @@ pub enum ArchiveError {
         /// Topics it declares.
         known: Vec<String>,
     },
-    /// The topic is not in the recording.
+    /// A topic that the recording does not have.
     #[error("{}: no topic {topic:?}{}", path.display(), topics_hint(known))]
     NoSuchTopic {
         /// The recording.
         path: PathBuf,
-        /// What was asked for.
+        /// The requested topic.
         topic: String,
         /// Topics it has.
         known: Vec<String>,
     },
-    /// The topic is there, but holds no message.
+    /// A topic without messages.
     #[error("{}: no message on topic {topic:?}", path.display())]
     NoMessages {
         /// The recording.
@@ -62,7 +62,7 @@ pub enum ArchiveError {
         /// The topic.
         topic: String,
     },
-    /// The topic carries another type.
+    /// A topic with another type or encoding than expected.
     #[error("{}: topic {topic:?} carries {found}, expected {expected}", path.display())]
     WrongType {
         /// The recording.
@@ -74,7 +74,7 @@ pub enum ArchiveError {
         /// Type and encoding it should have.
         expected: String,
     },
-    /// The topic carries joint states in an encoding that cannot be read.
+    /// A topic with joint states in an unsupported encoding.
     #[error("{}: {found}", path.display())]
     UnreadableJointStates {
         /// The recording.
@@ -94,7 +94,7 @@ pub enum ArchiveError {
         /// Number of other compressed files of the same bag.
         others: usize,
     },
-    /// A message is not what its topic says.
+    /// A message that cannot be decoded as the type of its topic.
     #[error("{}: topic {topic:?}, log time {} s, at {at}: {source}", path.display(), seconds(*log_time_ns))]
     Decode {
         /// The recording.
@@ -103,15 +103,15 @@ pub enum ArchiveError {
         topic: String,
         /// Log time of the message \[ns\].
         log_time_ns: i64,
-        /// Where it lies: bytes from the start of the file (of its chunk, if it is in one), or row.
+        /// Position in the file: byte offset (of its chunk, if it is in one), or row.
         at: u64,
-        /// What is wrong with it.
+        /// The decoding error.
         source: DecodeError,
     },
-    /// A part of the recording cannot be read. The reader goes on behind it if it is asked again.
+    /// An unreadable part of the recording. The next read continues behind it.
     #[error("{0}")]
     Damaged(Damage),
-    /// Chunks overlap so much in time that they cannot be put in order within the memory allowed.
+    /// Chunks that overlap in time and together exceed the memory limit, so that their messages cannot be sorted.
     #[error(
         "{}: {loaded} bytes of chunks that overlap in time at log time {} s; at most {limit} are held \
          in memory: repair the recording to put it in order",
@@ -127,41 +127,41 @@ pub enum ArchiveError {
         /// Bytes allowed.
         limit: usize,
     },
-    /// A line of a table is broken.
+    /// An error in a line of a table.
     #[error(transparent)]
     Csv(Box<CsvError>),
-    /// The mapping does not fit the table.
+    /// A mapping that does not fit the table.
     #[error("{}: {what}: {reason}", path.display())]
     CsvMapping {
         /// The table.
         path: PathBuf,
         /// The key of the mapping.
         what: String,
-        /// Why it does not fit.
+        /// Reason why it does not fit.
         reason: String,
     },
-    /// A row cannot be made into a message.
+    /// A row that cannot be encoded as a message.
     #[error("{}: topic {topic:?}: {source}", path.display())]
     Encode {
         /// The table.
         path: PathBuf,
         /// The topic it appears on.
         topic: String,
-        /// Why.
+        /// Reason.
         source: EncodeError,
     },
-    /// A LeRobot data set cannot be read, or not be used.
+    /// A LeRobot data set that cannot be read or used.
     #[error(transparent)]
     Lerobot(Box<LerobotError>),
-    /// A Parquet table cannot be read.
+    /// A Parquet table that cannot be read.
     #[error(transparent)]
     Parquet(Box<ParquetError>),
-    /// A database cannot be read.
+    /// A database that cannot be read.
     #[error("{}: {source}", path.display())]
     Sqlite {
         /// The file.
         path: PathBuf,
-        /// What SQLite says.
+        /// SQLite's error.
         source: rusqlite::Error,
     },
 }
@@ -184,7 +184,7 @@ impl ArchiveError {
         move |source| Self::Io { path, source }
     }
 
-    /// The fault, without the place in the file where it is known.
+    /// Returns the error text; for a message that cannot be decoded, without its position in the recording.
     pub fn reason(&self) -> String {
         match self {
             Self::Decode { source, .. } => source.to_string(),
@@ -192,7 +192,7 @@ impl ArchiveError {
         }
     }
 
-    /// The damage, if it is that and reading can go on behind it.
+    /// Returns the damage, if the error is one behind which reading can continue.
     pub fn damage(&self) -> Option<&Damage> {
         match self {
             Self::Damaged(damage) => Some(damage),
@@ -217,7 +217,7 @@ fn topics_hint(known: &[String]) -> String {
     }
 }
 
-/// What the operating system says, in words where there are better ones.
+/// Describes an I/O error; the common kinds have their own wording.
 fn of_io(path: &Path, source: &std::io::Error) -> String {
     let path = path.display();
     match source.kind() {

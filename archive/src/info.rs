@@ -1,4 +1,4 @@
-//! What is in a recording, at length.
+//! Detailed summary of the contents of a recording.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -14,22 +14,22 @@ use crate::ros::{JointState, JointStateDecoder};
 use crate::topic::Topic;
 use crate::undecodable::{self, Undecodable, UndecodableTally};
 
-/// A pause counts as a gap if it is this many times as long as the topic's mean period.
+/// Shortest pause that is reported as a gap \[mean periods of the topic\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const GAP_PERIODS: i64 = 5;
-/// The longest gaps of a topic that are listed.
+/// Maximum number of gaps listed per topic.
 /// Tuned: by eye, for the length of the list.
 const GAPS_LISTED: usize = 5;
-/// Joints of a topic that are listed.
+/// Maximum number of joints listed per topic.
 /// Resolution: bounds memory; more than the joints of a humanoid.
 const MOST_NAMES: usize = 64;
 
-/// What is in a recording: found by reading all of it.
+/// Summary of the contents of a recording, found by reading all of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Info {
-    /// Where it lies.
+    /// Its path.
     pub path: PathBuf,
-    /// What it is stored as.
+    /// Its storage format.
     pub kind: RecordingKind,
     /// Its size on disk \[bytes\].
     pub bytes: u64,
@@ -43,61 +43,61 @@ pub struct Info {
     pub message_count: u64,
     /// Its topics.
     pub topics: Vec<TopicInfo>,
-    /// What made it, if it was one of ours.
+    /// Provenance, if the recording was written by tauscope.
     pub provenance: Option<BTreeMap<String, String>>,
-    /// What of it cannot be read.
+    /// Unreadable parts.
     pub damage: Vec<Damage>,
-    /// Why its joint states cannot be compared with expected efforts, as far as its format tells.
+    /// Reason why its joint states cannot be compared with expected efforts, if its format implies one.
     pub obstacle: Option<String>,
 }
 
-/// What is on a topic.
+/// Summary of a topic.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TopicInfo {
-    /// Name, type and number of messages: of those that were read.
+    /// Name, type and number of messages that were read.
     #[serde(flatten)]
     pub topic: Topic,
-    /// Messages per second, on average from the first to the last of the topic.
+    /// Mean message rate from the first to the last message of the topic.
     pub rate_hz: Option<f64>,
     /// The longest pauses of at least five mean periods, longest first.
     pub gaps: Vec<Gap>,
     /// Messages that cannot be decoded.
     pub undecodable: u64,
-    /// The first reason of each kind with the number of messages; of many kinds the first four.
+    /// Number of messages for each kind of decoding error, with the first reason; at most four kinds.
     pub undecodable_reasons: Vec<Undecodable>,
-    /// What its joint states hold, if it carries any.
+    /// Summary of its joint states, if it carries any.
     pub joints: Option<JointsInfo>,
 }
 
 /// A pause in a topic.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Gap {
-    /// From the start of the recording to the last message before it \[s\].
+    /// Time of the last message before it, from the start of the recording \[s\].
     pub at_s: f64,
-    /// How long it lasts \[s\].
+    /// Duration \[s\].
     pub duration_s: f64,
 }
 
-/// What joint states hold.
+/// Summary of the joint states of a topic.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct JointsInfo {
-    /// Joints that messages name, each once, in the order in which they come; at most [`MOST_NAMES`].
+    /// Distinct joint names, in the order of appearance; at most [`MOST_NAMES`].
     pub names: Vec<String>,
     /// Whether positions were given in any message.
     pub position: bool,
-    /// Whether velocities were.
+    /// Whether velocities were given in any message.
     pub velocity: bool,
-    /// Whether efforts were.
+    /// Whether efforts were given in any message.
     pub effort: bool,
-    /// Messages with a NaN in them.
+    /// Number of messages that contain a NaN.
     pub nan_messages: u64,
-    /// Messages whose values are those of the message before.
+    /// Number of messages that repeat the values of the preceding message.
     pub repeated_messages: u64,
-    /// Messages stamped before the one that they follow.
+    /// Number of messages with an earlier stamp than the preceding message.
     pub backward_messages: u64,
     /// Messages that name a joint more than once.
     pub twice: Option<Twice>,
-    /// By joint, what its values are.
+    /// Summary of each joint.
     pub joints: Vec<JointFacts>,
 }
 
@@ -149,12 +149,12 @@ impl Info {
     }
 }
 
-/// Counts a topic.
+/// Running counts of a topic.
 struct Tally {
     topic: Topic,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
-    /// The longest pauses and where they begin, longest first.
+    /// Durations and start times of the longest pauses, longest first.
     pauses_ns: Vec<(i64, i64)>,
     undecodable: UndecodableTally,
     joints: Option<JointsInfo>,
@@ -267,9 +267,10 @@ fn counted(count: u64, noun: &str) -> String {
     format!("{count} {noun}{plural}")
 }
 
-/// What fits on a line of a terminal; a simulated archive holds its whole scenario.
+/// Shortens a value to a line of a terminal: a simulated archive holds its whole scenario.
 fn shortened(value: &str) -> String {
-    /// Resolution: what a person reads of a line.
+    /// Longest value that is printed whole \[characters\].
+    /// Resolution: the length of a line that a person reads.
     const LONGEST: usize = 80;
     let count = value.chars().count();
     if count <= LONGEST && !value.contains('\n') {
@@ -325,7 +326,7 @@ impl fmt::Display for Info {
     }
 }
 
-/// All of a topic but its name, type and number of messages.
+/// Everything about a topic except its name, type and number of messages.
 impl fmt::Display for TopicInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.rate_hz {

@@ -1,4 +1,4 @@
-//! What is odd about the joint states of a recording, joint by joint, found in one pass with bounded memory.
+//! Anomalies in the joint states of a recording by joint, found in one pass with bounded memory.
 
 mod jumps;
 mod not_finite;
@@ -13,55 +13,55 @@ pub use not_finite::{FIELDS, FieldTally, NotFinite};
 pub use twice::Twice;
 use twice::TwiceTally;
 
-/// Positions are compared with the integral of the velocity over at least this long \[ns\].
-/// Physical: ten samples at 100 Hz, so that an encoder's step is small beside the motion.
+/// Minimum span over which a change of position is compared with the integral of the velocity \[ns\].
+/// Physical: ten samples at 100 Hz, so that an encoder's step is small compared with the motion.
 const SPAN_NS: i64 = 100_000_000;
-/// After a longer pause the comparison begins anew \[ns\].
-/// Physical: an arm may have come and gone in half a second.
+/// Shortest pause between two samples that restarts the comparison \[ns\].
+/// Physical: an arm may move away and back within half a second.
 const PAUSE_NS: i64 = 500_000_000;
-/// A joint that has moved less than this in all does not tell whether its velocity fits \[rad or m\].
+/// Minimum travel of a joint for its velocity to be compared with its position \[rad or m\].
 /// Physical: a hundred steps of a coarse encoder of 6000 steps per turn.
 const TELLING_MOTION: f64 = 0.1;
-/// A velocity that is off by more than this share is odd.
+/// Relative error above which a velocity is reported as inconsistent with the position.
 /// Physical: low-passed velocities of real drives keep within 5 % of the derivative over 0.1 s.
 const ODD_SHARE: f64 = 0.1;
-/// Velocity over the derivative of position where positions are in degrees and velocities in rad/s.
+/// Ratio of the velocity to the derivative of the position if positions are in degrees and velocities in rad/s.
 const RADIANS_PER_DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// A joint over all messages.
+/// Summary of a joint over all messages.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct JointFacts {
     /// Its name.
     pub name: String,
     /// Smallest and largest position \[rad or m\].
     pub position_range: Option<[f64; 2]>,
-    /// The recorded velocity over the derivative of the position, where the joint moves enough to tell: 1 as it should
-    /// be.
+    /// Slope of the recorded velocity over the derivative of the position; 1 if they are consistent. `None` if the
+    /// joint moves too little or has more jumps than are listed.
     pub velocity_slope: Option<f64>,
-    /// The velocity that all messages give, where it never changes \[rad/s or m/s\]; -0 counts as 0.
+    /// The velocity, if it is the same in all messages \[rad/s or m/s\]; -0 is reported as 0.
     pub constant_velocity: Option<f64>,
-    /// How far it moved in all \[rad or m\]; 0 where velocities or positions are missing.
+    /// Total travel \[rad or m\]; 0 where velocities or positions are missing.
     pub travel: f64,
     /// Whether efforts are given and all of them are 0.
     pub effort_is_zero: bool,
-    /// Whether no effort is given that is a number.
+    /// Whether no message gives a finite effort.
     pub lacks_effort: bool,
-    /// By field, what is NaN or infinite.
+    /// Values that are NaN or infinite, by field.
     pub not_finite: Vec<NotFinite>,
-    /// Where the position changes by more than the velocity explains, in the order of time.
+    /// Changes of the position that the velocity does not explain, in the order of time.
     pub jumps: Vec<Jump>,
-    /// Whether there are more jumps than these: then nothing is said of the velocity.
+    /// Whether there are more jumps than are listed; [`Self::velocity_slope`] is then `None`.
     pub more_jumps: bool,
 }
 
 impl JointFacts {
-    /// Whether its positions are in degrees, told by its velocities.
+    /// Returns whether the positions are in degrees, judged by the velocities.
     pub fn is_in_degrees(&self) -> bool {
         let slope = self.velocity_slope;
         slope.is_some_and(|slope| (slope / RADIANS_PER_DEGREE - 1.0).abs() < ODD_SHARE)
     }
 
-    /// Where its position jumps, in words.
+    /// Describes the jumps of its position.
     pub fn jump_remark(&self) -> Option<String> {
         let (first, others) = self.jumps.split_first()?;
         let mut text = format!("the position of {} jumps {}", self.name, first.in_words());
@@ -74,37 +74,39 @@ impl JointFacts {
         Some(text)
     }
 
-    /// Whether its velocity is not the derivative of its position.
+    /// Returns whether the velocity is inconsistent with the derivative of the position.
     pub fn has_odd_velocity(&self) -> bool {
         let slope = self.velocity_slope;
         slope.is_some_and(|slope| (slope - 1.0).abs() > ODD_SHARE)
     }
 }
 
-/// Follows the joints of one topic, with memory for the joints alone. A message may name its joints in another order than the one before.
+/// Accumulates the facts about the joints of one topic. Its memory depends on the number of joints only. The order of
+/// the joints may differ between messages.
 #[derive(Debug, Default)]
 pub struct JointTallies {
     joints: Vec<JointTally>,
     last: Option<JointState>,
-    /// Messages whose values are those of the message before.
+    /// Number of messages that repeat the values of the preceding message.
     pub repeated: u64,
-    /// Messages stamped before the one that they follow.
+    /// Number of messages with an earlier stamp than the preceding message.
     pub backward: u64,
     twice: TwiceTally,
     /// Stamp of the first message \[ns\].
     first_ns: Option<i64>,
 }
 
-/// One joint.
+/// Accumulator of one joint.
 #[derive(Debug)]
 struct JointTally {
     name: String,
     range: Option<[f64; 2]>,
     efforts: u64,
     zeros: u64,
-    /// Position and stamp at which the span of the comparison begins, and the velocity integrated since.
+    /// Position and stamp \[ns\] at the start of the current span.
     from: Option<(f64, i64)>,
     before: Option<Before>,
+    /// Integral of the velocity over the current span.
     integral: f64,
     /// Smallest and largest velocity.
     velocity_range: Option<[f64; 2]>,
@@ -114,7 +116,7 @@ struct JointTally {
     fields: [FieldTally; 3],
 }
 
-/// The sample before.
+/// The preceding sample.
 #[derive(Debug, Clone, Copy)]
 struct Before {
     position: f64,
@@ -139,7 +141,7 @@ impl JointTally {
         }
     }
 
-    /// Takes position, velocity and effort, as far as they are given and numbers.
+    /// Adds a sample of position, velocity and effort; `None` for a value that is not given.
     fn add(&mut self, stamp_ns: i64, values: [Option<f64>; 3]) {
         for (field, value) in self.fields.iter_mut().zip(values) {
             if let Some(value) = value {
@@ -202,7 +204,7 @@ impl JointTally {
         });
     }
 
-    /// Times count from `first_ns` on.
+    /// Returns the facts, with times relative to `first_ns`.
     fn facts(&self, first_ns: i64) -> JointFacts {
         let mut sums = self.sums;
         sums.add(&self.jumps.without_jump());
@@ -228,7 +230,7 @@ impl JointTally {
 }
 
 impl JointTallies {
-    /// Takes a message.
+    /// Adds a message.
     pub fn add(&mut self, state: &JointState) {
         let stamp_ns = state.header.stamp.ns();
         self.first_ns.get_or_insert(stamp_ns);
@@ -256,7 +258,7 @@ impl JointTallies {
         self.last.get_or_insert_default().clone_from(state);
     }
 
-    /// For samples that hold their joints always in the order of `names`.
+    /// Creates the tallies for samples whose joints are always in the order of `names`.
     pub fn in_order(names: &[String]) -> Self {
         let joints = names.iter().map(|name| JointTally::new(name)).collect();
         Self {
@@ -265,7 +267,7 @@ impl JointTallies {
         }
     }
 
-    /// Takes the values of one instant; no values for what the source does not give.
+    /// Adds the values of one instant. A slice is empty if the source does not give its quantity.
     pub fn add_values(
         &mut self,
         stamp_ns: i64,
@@ -293,7 +295,7 @@ impl JointTallies {
         })
     }
 
-    /// By joint, in the order of their first message.
+    /// Returns the facts about each joint, in the order of appearance.
     pub fn facts(&self) -> Vec<JointFacts> {
         let first_ns = self.first_ns.unwrap_or(0);
         let joints = self.joints.iter();

@@ -1,11 +1,12 @@
 //! Episodes of LeRobot data sets (<https://github.com/huggingface/lerobot>), versions 2.0 to 3.0.
 //!
-//! A data set is a folder. `meta/info.json` says which features a row has and where the rows lie: in version 2 a
-//! Parquet file for each episode, in version 3 files with several episodes, which `meta/episodes` lists. An episode is
-//! a recording: `DATASET/episode_000003`, whether a file has that name or not. Its rows appear as joint states.
+//! A data set is a folder. Its `meta/info.json` lists the features of a row and the files with the rows. Version 2
+//! has a Parquet file for each episode. Version 3 has files with several episodes, which `meta/episodes` lists. An
+//! episode is a recording, addressed as `DATASET/episode_000003` whether or not a file has that name. Its rows appear
+//! as joint states.
 //!
-//! What is positions, velocities and efforts in a row is told by the names of the features and of their elements
-//! ([`names`], [`layout`]), or by a file beside the data set, `DATASET.columns.yaml` ([`columns`]).
+//! Positions, velocities and efforts are recognised by the names of the features and of their elements ([`names`],
+//! [`layout`]), or declared in a file next to the data set, `DATASET.columns.yaml` ([`columns`]).
 
 mod columns;
 mod cursor;
@@ -30,15 +31,16 @@ use layout::Layout;
 pub(crate) const TOPIC: &str = "/joint_states";
 /// Column of the time from the start of the episode \[s\].
 const TIMESTAMP: &str = "timestamp";
-/// Most elements of a feature that are looked at, as [`Rows`] reads them.
+/// Maximum number of elements of a feature, equal to the limit of [`Rows`].
 /// Resolution: bounds memory; a humanoid has some hundreds.
 const MOST_ELEMENTS: usize = 1 << 14;
 /// Column of the number of the episode.
 const EPISODE_INDEX: &str = "episode_index";
-/// An arm that turns does not go beyond \[rad\]: two turns.
-/// Physical: cables end the turns of a joint; what goes on and on is no joint of an arm.
+/// Farthest plausible position of a revolute joint: two turns \[rad\].
+/// Physical: cables limit the turns of a joint; an axis that turns without limit is not a joint of an arm.
 const BEYOND: f64 = 4.0 * std::f64::consts::PI;
-/// If this share of the joints goes beyond, the positions are in degrees. A gripper in percent alone is less.
+/// Inverse of the fraction of joints beyond [`BEYOND`] at which positions are classified as degrees. A single gripper
+/// in percent is below this fraction.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SHARE_BEYOND: usize = 3;
 
@@ -54,7 +56,7 @@ pub(crate) struct Episode {
     pub(crate) rows: u64,
     /// Time of the first and the last row \[ns\].
     pub(crate) times_ns: Option<(i64, i64)>,
-    /// Why its joint states cannot be compared with expected efforts.
+    /// Reason why its joint states cannot be compared with expected efforts.
     obstacle: Option<LerobotProblem>,
 }
 
@@ -83,7 +85,7 @@ impl Episode {
         Ok(episode)
     }
 
-    /// Reads all rows: when they are, and whether their positions are in degrees.
+    /// Reads all rows to find their time range and whether their positions are in degrees.
     fn read_through(&mut self, columns: &ColumnsFile) -> Result<(), ArchiveError> {
         let mut cursor = self.cursor()?;
         let mut farthest = vec![0.0_f64; self.layout.joints.len()];
@@ -112,7 +114,7 @@ impl Episode {
         Ok(())
     }
 
-    /// Whether its joint states can be compared with expected efforts of `joints`.
+    /// Checks that its joint states can be compared with expected efforts of `joints`.
     pub(crate) fn check_comparable(&self, joints: &[String]) -> Result<(), ArchiveError> {
         let own = &self.layout.joints;
         let missing = joints.iter().filter(|joint| !own.contains(joint));
@@ -128,7 +130,7 @@ impl Episode {
         }
     }
 
-    /// Size of the file in which it lies \[bytes\].
+    /// Returns the size of its file \[bytes\].
     pub(crate) fn bytes(&self) -> u64 {
         self.file.bytes
     }
@@ -138,7 +140,7 @@ impl Episode {
     }
 }
 
-/// The first row of the episode `number` in a file, and how many there are.
+/// Returns the first row of the episode `number` in a file, and its number of rows.
 fn rows_of(file: &Arc<ParquetFile>, number: u64) -> Result<(u64, u64), ArchiveError> {
     if !file.has(EPISODE_INDEX) {
         return Ok((0, file.rows()));
@@ -163,7 +165,8 @@ fn rows_of(file: &Arc<ParquetFile>, number: u64) -> Result<(u64, u64), ArchiveEr
     found.ok_or_else(|| wrong(LerobotProblem::NotInFile { number, held }))
 }
 
-/// The next row of a column of places. What is no place is [`u64::MAX`], which nothing has.
+/// Returns the next value of a column of indices. A value that is not an index becomes [`u64::MAX`], which nothing
+/// has.
 fn next_index(rows: &mut Rows) -> Result<Option<u64>, ArchiveError> {
     let mut row = Vec::with_capacity(1);
     if !rows.next_row(&mut row)? {

@@ -1,18 +1,18 @@
-//! Why an episode of a data set cannot be read or used, and what to do.
+//! Errors of LeRobot data sets, with their remedies.
 
 use std::path::{Path, PathBuf};
 
-/// Features that an error lists.
+/// Maximum number of features in an error message.
 /// Tuned: by eye, for the length of the message.
 const SHOWN: usize = 12;
 
-/// Why a LeRobot data set cannot be read or used, and which.
+/// An error in a LeRobot data set, with its path.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", path.display())]
 pub struct LerobotError {
-    /// The data set, or the file of it.
+    /// The data set, or a file of it.
     pub path: PathBuf,
-    /// What is wrong.
+    /// The problem.
     pub problem: LerobotProblem,
 }
 
@@ -25,113 +25,113 @@ impl LerobotError {
     }
 }
 
-/// What is wrong with a LeRobot data set.
+/// A problem of a LeRobot data set.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum LerobotProblem {
-    /// The file that describes it is not there.
+    /// A data set without `meta/info.json`.
     #[error(
         "it looks like a LeRobot data set, but there is no meta/info.json, which says what its columns are: download \
          the folder `meta`, too"
     )]
     NoInfo,
-    /// A Parquet table that lies in no data set.
+    /// A Parquet table outside a data set.
     #[error(
         "a Parquet table is a recording only within its LeRobot data set: no meta/info.json lies in the folders above it"
     )]
     NoSet,
-    /// A file of it makes no sense.
+    /// A malformed file of the data set.
     #[error("{0}")]
     Broken(String),
-    /// Of a version whose files are others.
+    /// An unsupported version.
     #[error(
         "a LeRobot data set of version {version}; those of 2.0 to 3.0 are read: convert it with the scripts of LeRobot"
     )]
     Version {
-        /// What it says.
+        /// The version that it declares.
         version: String,
     },
-    /// Several episodes where one recording is wanted.
+    /// Several episodes where one recording is required.
     #[error(
         "a LeRobot data set of {count} episodes, each of which is a recording: name one, {} to {}",
         first.display(), last.display()
     )]
     Several {
-        /// How many.
+        /// Number of episodes.
         count: usize,
-        /// How the first one is named.
+        /// Path of the first episode.
         first: PathBuf,
-        /// How the last one is named.
+        /// Path of the last episode.
         last: PathBuf,
     },
-    /// It holds no episode of that number.
+    /// An episode that the data set does not have.
     #[error(
         "there is no episode {number}; it has {count} episodes, from episode_{first:06} to episode_{last:06}"
     )]
     NoEpisode {
-        /// What was asked for.
+        /// Number of the requested episode.
         number: u64,
-        /// How many there are.
+        /// Number of episodes of the data set.
         count: usize,
-        /// The first one.
+        /// Number of the first episode.
         first: u64,
-        /// The last one.
+        /// Number of the last episode.
         last: u64,
     },
-    /// It holds no episodes.
+    /// A data set without episodes.
     #[error("the LeRobot data set has no episodes")]
     Empty,
-    /// The file of an episode is not there.
+    /// A missing file of an episode.
     #[error("episode {number} lies in {file}, which is not there: download it, too")]
     NoFile {
         /// The episode.
         number: u64,
-        /// Its file, below the data set.
+        /// Its file, relative to the data set.
         file: String,
     },
-    /// The rows of an episode are not in its file.
+    /// A file without the rows of its episode.
     #[error("no row of it has the episode_index {number}{}", held_words(*held))]
     NotInFile {
         /// The episode.
         number: u64,
-        /// One that it has.
+        /// First episode in the file, if any.
         held: Option<u64>,
     },
-    /// The rows of an episode do not follow each other.
+    /// An episode whose rows are not contiguous.
     #[error("the rows of episode {number} do not follow each other")]
     Scattered {
         /// The episode.
         number: u64,
     },
-    /// No feature holds positions.
+    /// A data set without a feature of positions.
     #[error(
         "no feature holds the positions of joints; there are {}: name one in {}, `position: {{names: [FEATURE]}}`",
         list(features), columns_file.display()
     )]
     NoPosition {
-        /// Features that hold numbers.
+        /// The numeric features.
         features: Vec<String>,
-        /// Where to say it.
+        /// Path of the columns file in which to declare it.
         columns_file: PathBuf,
     },
-    /// The file of columns does not fit.
+    /// A columns file that does not fit the data set.
     #[error("{what}: {reason}")]
     Columns {
         /// The key.
         what: &'static str,
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// A row is no joint state.
+    /// A row that is not a joint state.
     #[error("row {row} ({feature}): {reason}")]
     Row {
         /// The row of the file, from 0.
         row: u64,
         /// The feature.
         feature: String,
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// There are no efforts.
+    /// A data set without efforts.
     #[error(
         "the LeRobot data set has no efforts, and without them there is nothing to compare with the expected ones; its \
          features are {}. Record torque or motor current as `observation.effort`. If a feature holds it under another \
@@ -139,35 +139,35 @@ pub enum LerobotProblem {
         list(features), columns_file.display()
     )]
     NoEffort {
-        /// Features that hold numbers.
+        /// The numeric features.
         features: Vec<String>,
-        /// Where to say it.
+        /// Path of the columns file in which to declare it.
         columns_file: PathBuf,
     },
-    /// The joints have other names than those of the robot.
+    /// Joints with other names than those of the robot.
     #[error(
         "the LeRobot data set names no {}; its joints are {}. If they are the same joints, write the robot's names in this \
          order in {}: `joints: [NAME, ...]`",
         list(missing), own.join(", "), columns_file.display()
     )]
     Joints {
-        /// Joints of the robot that it does not name.
+        /// Joints of the robot that the data set does not name.
         missing: Vec<String>,
-        /// Those that it names.
+        /// Joints that the data set names.
         own: Vec<String>,
-        /// Where to say it.
+        /// Path of the columns file in which to declare it.
         columns_file: PathBuf,
     },
-    /// Positions are in degrees.
+    /// Positions beyond the range of an arm, probably in degrees.
     #[error(
         "joints go to {most:.0} rad, which no arm does: write `degrees: true` in {} if the data set is in degrees, as those \
          of OpenArm are, and `degrees: false` if it is in rad",
         columns_file.display()
     )]
     Degrees {
-        /// The largest position.
+        /// Largest absolute position.
         most: f64,
-        /// Where to say it.
+        /// Path of the columns file in which to declare it.
         columns_file: PathBuf,
     },
 }

@@ -1,9 +1,8 @@
 //! Reading MCAP files (<https://mcap.dev/spec>) chunk by chunk.
 //!
-//! [`Layout::read`] learns what the file holds and where: from the index at its end if that is
-//! sound, else by walking all of it. [`mcap_cursor`] then loads chunks as they are needed and gives
-//! their messages in order of log time. At no time is more in memory than the index and the chunks
-//! that overlap the current log time.
+//! [`Layout::read`] finds the contents of the file from the index at its end if that is sound, and otherwise by
+//! reading all of it. [`mcap_cursor`] then loads chunks as they are needed and returns their messages in the order of
+//! log time. Only the index and the chunks that overlap the current log time are in memory.
 
 mod attachment;
 mod chunk;

@@ -23,17 +23,17 @@ pub(crate) use error::{io, mcap, yaml};
 pub use options::Compression;
 pub(crate) use options::options;
 
-/// A chunk is closed, and handed to the operating system, when the next message would make it span
-/// this much log time: what a kill can cost at most \[ns\].
-/// Resolution: the file's size, against what a kill costs.
+/// Maximum log time spanned by a chunk \[ns\]. A full chunk is handed to the operating system, so a killed process
+/// loses at most this span.
+/// Resolution: the file's size, against the loss when the process is killed.
 pub const CHUNK_SPAN_NS: i64 = 100_000_000;
-/// A chunk is also closed at this size \[bytes\].
+/// Size at which a chunk is closed early \[bytes\].
 /// Resolution: memory, against the file's size.
 const CHUNK_BYTES: usize = 1 << 20;
-/// What the index takes for a chunk, at most, with a dozen topics \[bytes\].
-/// Resolution: how much room a file that is open keeps for its end.
+/// Upper bound on the size of the index per chunk, with a dozen topics \[bytes\].
+/// Resolution: the disk space reserved for the end of an open file.
 const INDEX_BYTES_A_CHUNK: u64 = 500;
-/// Says who wrote the file; without a version, which stands in the provenance.
+/// Name of the writing library in the header. The version is in the provenance.
 const LIBRARY: &str = "tauscope";
 /// Name of the metadata record with the provenance.
 pub const PROVENANCE: &str = "tauscope";
@@ -41,15 +41,15 @@ pub const PROVENANCE: &str = "tauscope";
 /// Writes one MCAP file: profile `ros2`, CDR messages with their `ros2msg` text, and the metadata
 /// that rosbag2 looks for.
 ///
-/// While it is written the file is called `<name>.mcap.part`; [`McapWriter::finish`] completes and
-/// renames it. So a file with its proper name is whole, and a writer that died leaves a `.part`
-/// that [`Recording::open`](crate::Recording::open) reads and [`repair`](crate::repair()) completes.
+/// While it is written the file is called `<name>.mcap.part`; [`McapWriter::finish`] completes and renames it. So a
+/// file with its final name is complete. A writer that crashed leaves a `.part` that
+/// [`Recording::open`](crate::Recording::open) reads and [`repair`](crate::repair()) completes.
 ///
-/// The same calls give the same bytes, on any machine. Memory is bounded by the open chunk, but for
-/// the index, which grows by about 300 bytes with each chunk (10 MB an hour).
+/// The same calls produce the same bytes on any machine. Memory is bounded by the open chunk, except for the index,
+/// which grows by about 300 bytes with each chunk (10 MB an hour).
 pub struct McapWriter {
     writer: mcap::Writer<BufWriter<File>>,
-    /// The same file, to sync it and to ask for its length.
+    /// Second handle of the file, to sync it and to query its length.
     file: File,
     path: PathBuf,
     part: PathBuf,
@@ -60,9 +60,9 @@ pub struct McapWriter {
     /// Log time of the first message in the open chunk.
     chunk_start_ns: Option<i64>,
     chunk_bytes: usize,
-    /// Chunks that were closed.
+    /// Number of closed chunks.
     chunks: u64,
-    /// Bytes in the file when the last chunk was closed.
+    /// Length of the file when the last chunk was closed.
     bytes: u64,
     log_times_ns: Option<(i64, i64)>,
     body: Vec<u8>,
@@ -91,7 +91,7 @@ struct WrittenTopic {
     count: u64,
 }
 
-/// What [`McapWriter::finish`] has left.
+/// Result of [`McapWriter::finish`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Written {
     /// The file.
@@ -103,14 +103,14 @@ pub struct Written {
 }
 
 impl McapWriter {
-    /// Begins the file `path`, with its folder if need be, as `<path>.part`. `provenance` says what
-    /// made it (versions, hashes of the files that went in); it is the first thing written.
+    /// Creates the file `path` as `<path>.part`, and its folder if necessary. The `provenance` (versions, hashes of
+    /// the input files) is written first.
     ///
-    /// A `.part` that a writer before left behind may hold the only copy of a recording: it is moved
-    /// out of the way and kept, see [`McapWriter::set_aside`].
+    /// A `.part` that an earlier writer left behind may be the only copy of a recording. It is renamed and kept, see
+    /// [`McapWriter::set_aside`].
     ///
     /// # Errors
-    /// If the file cannot be made.
+    /// If the file cannot be created.
     pub fn create(
         path: impl AsRef<Path>,
         compression: Compression,
@@ -156,16 +156,16 @@ impl McapWriter {
         Ok(this)
     }
 
-    /// What becomes of a file that has the name when this one is complete. Unless told otherwise it is
-    /// kept, and this one gets the first name that is free: `a.1.mcap` for `a.mcap`.
+    /// Sets the policy for a file that already has the final name. By default it is kept, and the new file gets the
+    /// first free name: `a.1.mcap` for `a.mcap`.
     #[must_use]
     pub fn existing(mut self, existing: Existing) -> Self {
         self.existing = existing;
         self
     }
 
-    /// Brings each closed chunk to the disk, though not more often than `every`. Without this only the
-    /// complete file is synced, and a power cut may cost all of an incomplete one.
+    /// Syncs closed chunks to the disk, at most once per `every`. Without this only the complete file is synced, and
+    /// a power failure may lose all of an incomplete one.
     ///
     /// # Errors
     /// If the thread for it cannot be started.
@@ -176,22 +176,22 @@ impl McapWriter {
         Ok(self)
     }
 
-    /// The longest that the disk took to sync what was written.
+    /// Returns the longest duration of a sync.
     pub fn slowest_sync(&self) -> Duration {
         self.sync.as_ref().map_or(Duration::ZERO, DiskSync::slowest)
     }
 
-    /// What its index, which is written at the end, will take \[bytes\].
+    /// Returns the estimated size of the index, which is written at the end \[bytes\].
     pub fn index_bytes(&self) -> u64 {
         self.chunks * INDEX_BYTES_A_CHUNK
     }
 
-    /// Length of the file when its last chunk was closed \[bytes\].
+    /// Returns the length of the file when its last chunk was closed \[bytes\].
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Where a `.part` of a writer before was moved to.
+    /// Returns the path to which the `.part` of an earlier writer was moved.
     pub fn set_aside(&self) -> Option<&Path> {
         self.set_aside.as_deref()
     }
@@ -236,7 +236,7 @@ impl McapWriter {
     /// If it cannot be encoded or written, or a time lies before the epoch.
     ///
     /// # Panics
-    /// If `topic` is of another writer.
+    /// If `topic` belongs to another writer.
     pub fn write<M: ros::Message>(
         &mut self,
         topic: TopicWriter<M>,
@@ -279,8 +279,8 @@ impl McapWriter {
             .map_err(mcap(&self.part))
     }
 
-    /// Closes the open chunk and hands all to the operating system. To be called about ten times a
-    /// second while a live stream is silent; else the last messages before the silence wait.
+    /// Closes the open chunk and hands it to the operating system. While a live stream is silent, call this about ten
+    /// times a second; otherwise the last messages before the silence stay in memory.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -297,7 +297,7 @@ impl McapWriter {
             .map_or(Ok(()), |sync| sync.ask().map_err(io(&self.part)))
     }
 
-    /// Completes the file and gives it its proper name, which [`Written::path`] tells.
+    /// Completes the file and renames it to its final name, which is [`Written::path`].
     ///
     /// # Errors
     /// If it cannot be written; the `.part` stays.
@@ -355,7 +355,7 @@ impl McapWriter {
     }
 }
 
-/// Completes the file that `writer` has written as `part` and renames it; gives its length.
+/// Completes the file that `writer` has written as `part` and renames it. Returns its length.
 pub(crate) fn complete(
     mut writer: mcap::Writer<BufWriter<File>>,
     part: &Path,

@@ -1,11 +1,11 @@
 //! Columns of numbers out of a Parquet file (<https://parquet.apache.org/docs/file-format/>), row by row.
 //!
-//! What is read: numbers and lists of numbers, plain or by dictionary, in pages of version 1 and 2, uncompressed or
-//! compressed with Snappy or Zstandard. This is what pyarrow, pandas, Hugging Face `datasets` and Polars write unless
-//! told otherwise. Everything else is refused by its name.
+//! Supported are numbers and lists of numbers, plain or by dictionary, in pages of version 1 and 2, uncompressed or
+//! compressed with Snappy or Zstandard. pyarrow, pandas, Hugging Face `datasets` and Polars write this by default.
+//! Everything else is rejected with its name.
 //!
-//! Files come from strangers. What a file declares of its own sizes is checked against the file and a limit before
-//! memory is taken. A page of a column, and its dictionary, are all that is held.
+//! Files are not trusted. A declared size is checked against the file and a limit before memory is allocated. Only
+//! one page of a column and its dictionary are held.
 
 mod error;
 mod footer;
@@ -24,9 +24,9 @@ use footer::Footer;
 pub(crate) use footer::Physical;
 pub(crate) use rows::Rows;
 
-/// How a Parquet file begins and ends.
+/// First and last bytes of a Parquet file.
 pub(crate) const MAGIC: &[u8] = b"PAR1";
-/// How a file begins that Git LFS has not fetched: `version https://git-lfs.github.com/spec/v1`.
+/// First bytes of a file that Git LFS has not fetched: `version https://git-lfs.github.com/spec/v1`.
 const LFS_POINTER: [u8; 4] = *b"vers";
 /// Longest footer that is read \[bytes\].
 /// Resolution: bounds memory; a thousand row groups of 300 columns have 45 MB.
@@ -34,7 +34,7 @@ const MAX_FOOTER_BYTES: u64 = 64 << 20;
 /// The length of the footer and the magic, at the end of the file \[bytes\].
 const TAIL_BYTES: u64 = 8;
 
-/// An open file, of which some columns are wanted.
+/// An open file with the selected columns.
 #[derive(Debug)]
 pub(crate) struct ParquetFile {
     path: PathBuf,
@@ -44,10 +44,10 @@ pub(crate) struct ParquetFile {
 }
 
 impl ParquetFile {
-    /// Opens the file at `path`, to read the columns `wanted` of it. Which of them it has, [`ParquetFile::has`] tells.
+    /// Opens the file at `path` to read the columns `wanted`. [`ParquetFile::has`] returns whether one exists.
     ///
     /// # Errors
-    /// If it is torn, or its footer makes no sense or is too long.
+    /// If it is truncated, or its footer is malformed or too long.
     pub(crate) fn open(path: &Path, wanted: &[&str]) -> Result<Arc<Self>, ParquetError> {
         let refuse = |problem: ParquetProblem| ParquetError::new(path, problem);
         let file = File::open(path).map_err(|error| refuse(error.into()))?;
@@ -63,31 +63,31 @@ impl ParquetFile {
         }))
     }
 
-    /// Where it lies.
+    /// Returns its path.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Rows of the table.
+    /// Returns the number of rows.
     pub(crate) fn rows(&self) -> u64 {
         self.footer.groups.iter().map(|group| group.rows).sum()
     }
 
-    /// How the numbers of a column that was wanted are stored, if the file has it.
+    /// Returns the storage type of a selected column, if the file has it.
     pub(crate) fn physical(&self, column: &str) -> Option<Physical> {
         let leaf = self.footer.leaves.iter().find(|leaf| leaf.name == column)?;
         Some(leaf.physical)
     }
 
-    /// Whether it has a column that was wanted.
+    /// Returns whether the file has a selected column.
     pub(crate) fn has(&self, column: &str) -> bool {
         self.physical(column).is_some()
     }
 
-    /// The rows of `column` from the one at `first` on.
+    /// Returns the rows of `column`, starting at row `first`.
     ///
     /// # Errors
-    /// If there is no such column, it is no column of numbers, or what lies before `first` cannot be read.
+    /// If there is no such column, it is not numeric, or the rows before `first` cannot be read.
     pub(crate) fn column(self: &Arc<Self>, column: &str, first: u64) -> Result<Rows, ParquetError> {
         let place = (self.footer.leaves.iter()).position(|leaf| leaf.name == column);
         let Some(place) = place else {
@@ -101,7 +101,7 @@ impl ParquetFile {
         Rows::open(Arc::clone(self), place, first)
     }
 
-    /// Fills `buffer` from the byte at `at` on.
+    /// Fills `buffer` with the bytes at offset `at`.
     fn read(&self, buffer: &mut [u8], at: u64) -> Result<(), ParquetProblem> {
         Ok(self.file.read_exact_at(buffer, at)?)
     }

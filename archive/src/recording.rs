@@ -1,4 +1,4 @@
-//! A recording, whatever its format.
+//! A recording in any of the supported formats.
 
 mod body;
 mod joint_states;
@@ -33,7 +33,7 @@ pub use messages::{Message, Messages};
 pub use places::{Sources, is_there, name_of, recordings_at, sources};
 use several::{Part, SeveralCursor};
 
-/// What a recording is stored as.
+/// Storage format of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RecordingKind {
@@ -52,7 +52,7 @@ pub enum RecordingKind {
 }
 
 impl RecordingKind {
-    /// Whether it is a table of rows: it has neither topics nor log times of its own.
+    /// Returns whether it is a table of rows, which has neither topics nor log times of its own.
     pub fn is_table(self) -> bool {
         matches!(self, Self::Csv | Self::Lerobot)
     }
@@ -71,7 +71,7 @@ impl std::fmt::Display for RecordingKind {
     }
 }
 
-/// A recording that has been opened: what is in it is known, its messages are not read yet.
+/// An open recording. Its contents are known, its messages are not read yet.
 pub struct Recording {
     path: PathBuf,
     kind: RecordingKind,
@@ -87,12 +87,12 @@ enum Store {
     Mcap(Arc<Layout>),
     Sqlite {
         file: Box<SqliteFile>,
-        /// The place in the list of topics of each topic's number in the database.
+        /// Index in the list of topics, by the number of the topic in the database.
         numbers: BTreeMap<i64, usize>,
     },
     Ros1 {
         bag: Arc<Ros1Bag>,
-        /// The place in the list of topics of each connection's topic.
+        /// Index in the list of topics, by the number of the connection.
         topics: BTreeMap<u32, usize>,
     },
     Several(Arc<Vec<Part>>),
@@ -101,59 +101,59 @@ enum Store {
 }
 
 impl Recording {
-    /// Where it lies.
+    /// Returns its path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What it is stored as.
+    /// Returns its storage format.
     pub fn kind(&self) -> RecordingKind {
         self.kind
     }
 
-    /// Its size on disk \[bytes\].
+    /// Returns its size on disk \[bytes\].
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Its metadata records (MCAP only): keys and values by the name of the record.
+    /// Returns its metadata records (MCAP only): keys and values by the name of the record.
     pub fn metadata(&self) -> &BTreeMap<String, BTreeMap<String, String>> {
         &self.metadata
     }
 
-    /// What made it, if it was one of ours: versions, and hashes of what went in.
+    /// Returns its provenance, if it was written by tauscope: versions, and hashes of the inputs.
     pub fn provenance(&self) -> Option<&BTreeMap<String, String>> {
         self.metadata.get(PROVENANCE)
     }
 
-    /// Its topics, with their types and message counts.
+    /// Returns its topics, with their types and message counts.
     pub fn topics(&self) -> &[Topic] {
         &self.topics.list
     }
 
-    /// Log time of the first message \[ns since the epoch\]; `None` if it is empty.
+    /// Returns the log time of the first message \[ns since the epoch\]; `None` if it is empty.
     pub fn start_ns(&self) -> Option<i64> {
         self.log_times_ns.map(|(start_ns, _)| start_ns)
     }
 
-    /// Log time of the last message \[ns since the epoch\]; `None` if it is empty.
+    /// Returns the log time of the last message \[ns since the epoch\]; `None` if it is empty.
     pub fn end_ns(&self) -> Option<i64> {
         self.log_times_ns.map(|(_, end_ns)| end_ns)
     }
 
-    /// Messages that can be read, over all topics.
+    /// Returns the number of readable messages over all topics.
     pub fn message_count(&self) -> u64 {
         self.topics().iter().map(|topic| topic.message_count).sum()
     }
 
-    /// What is known by now to be unreadable. A broken chunk in a file with a sound index is found
-    /// only when it is read, and told by [`Messages`] then.
+    /// Returns the damage known so far. A corrupt chunk in a file with a sound index is found only when it is read,
+    /// and is then reported by [`Messages`].
     pub fn damage(&self) -> &[Damage] {
         &self.damage
     }
 
-    /// Sentences on what was recognised when the recording was opened: columns, units and time of a CSV table. Empty
-    /// for other formats.
+    /// Returns sentences on what was recognised when the recording was opened: columns, units and time of a CSV
+    /// table. Empty for other formats.
     pub fn remarks(&self) -> &[String] {
         match &self.store {
             Store::Csv(table) => &table.remarks,
@@ -161,11 +161,11 @@ impl Recording {
         }
     }
 
-    /// Whether its joint states can be compared with expected efforts of `joints`, as far as its format tells: a LeRobot
-    /// data set may have no efforts, positions in degrees without saying so, or names of its own for the joints.
+    /// Checks that its format allows a comparison of its joint states with expected efforts of `joints`. A LeRobot
+    /// data set may have no efforts, undeclared positions in degrees, or other names for the joints.
     ///
     /// # Errors
-    /// [`ArchiveError::Lerobot`], with what to do.
+    /// [`ArchiveError::Lerobot`], with the remedy.
     pub fn check_comparable(&self, joints: &[String]) -> Result<(), ArchiveError> {
         match &self.store {
             Store::Lerobot(episode) => episode.check_comparable(joints),
@@ -173,7 +173,7 @@ impl Recording {
         }
     }
 
-    /// The topic `name`, which must carry messages of type `M` as CDR, and at least one.
+    /// Returns the topic `name`, which must carry at least one message, of type `M` as CDR.
     ///
     /// # Errors
     /// [`ArchiveError::Empty`], [`ArchiveError::NoSuchTopic`], [`ArchiveError::WrongType`] or
@@ -183,7 +183,7 @@ impl Recording {
         self.topic_where(name, M::TYPE, is_one)
     }
 
-    /// The topic `name`, which must carry joint states of any type as CDR, and at least one.
+    /// Returns the topic `name`, which must carry at least one joint state, of any type as CDR.
     ///
     /// # Errors
     /// As [`Recording::topic_of`], and [`ArchiveError::UnreadableJointStates`] for joint states in another encoding.
@@ -203,7 +203,7 @@ impl Recording {
         }
     }
 
-    /// Topics with joint states in an encoding that cannot be read.
+    /// Returns the topics with joint states in an unsupported encoding.
     pub fn unreadable_joint_states(&self) -> Vec<UnreadableJointStates> {
         let topics = self.topics().iter();
         topics.filter_map(Topic::unreadable_joint_states).collect()
@@ -242,7 +242,8 @@ impl Recording {
         Ok(topic)
     }
 
-    /// Chunks of an MCAP file or a bag of ROS 1, counted as [`Messages::chunks_read`] does; 0 where the format has none.
+    /// Returns the number of chunks of an MCAP file or a bag of ROS 1, counted as in [`Messages::chunks_read`]; 0 for
+    /// other formats.
     pub fn chunks(&self) -> u64 {
         match &self.store {
             Store::Mcap(layout) => layout.chunks(),
@@ -252,7 +253,7 @@ impl Recording {
         }
     }
 
-    /// The messages of these topics in the order of their log times.
+    /// Returns the messages of these topics in the order of their log times.
     ///
     /// # Errors
     /// [`ArchiveError::NoSuchTopic`], or if the recording can no longer be opened.
@@ -260,8 +261,8 @@ impl Recording {
         self.messages_within(topics, i64::MIN..=i64::MAX)
     }
 
-    /// As [`Recording::messages`], but only those whose log time lies in `within_ns` \[ns since the epoch\]. Chunks
-    /// that lie outside are not read, and what is damaged in them is not told.
+    /// Like [`Recording::messages`], but only with log times in `within_ns` \[ns since the epoch\]. Chunks outside
+    /// this range are not read, and their damage is not reported.
     ///
     /// # Errors
     /// As [`Recording::messages`].
@@ -279,7 +280,7 @@ impl Recording {
         self.read(&wanted, within_ns)
     }
 
-    /// All messages in the order of their log times.
+    /// Returns all messages in the order of their log times.
     ///
     /// # Errors
     /// If the recording can no longer be opened.
@@ -287,7 +288,7 @@ impl Recording {
         self.read(&vec![true; self.topics.list.len()], i64::MIN..=i64::MAX)
     }
 
-    /// The joint states on `topic`, decoded, in the order of their log times.
+    /// Returns the joint states on `topic`, decoded, in the order of their log times.
     ///
     /// # Errors
     /// As [`Recording::joint_state_topic`] and [`Recording::messages`].
@@ -309,7 +310,7 @@ impl Recording {
         ))
     }
 
-    /// Over the topics marked in `wanted`, by their place in [`Recording::topics`].
+    /// Creates a cursor over the topics marked in `wanted`, by their index in [`Recording::topics`].
     fn cursor(
         &self,
         wanted: &[bool],
@@ -343,7 +344,7 @@ impl Recording {
         }
     }
 
-    /// All topics of that name: publishers may disagree on the type.
+    /// Returns the indices of all topics of that name; publishers may disagree on the type.
     fn topic_indexes(&self, name: &str) -> Result<Vec<usize>, ArchiveError> {
         let named = |&i: &usize| self.topics.list[i].name == name;
         let indexes: Vec<_> = (0..self.topics.list.len()).filter(named).collect();

@@ -1,5 +1,5 @@
-//! Rebuilds an MCAP file whose writer died, or that was damaged since, and joins the pieces that a
-//! writer left which died several times.
+//! Repair of MCAP files. It rebuilds a file whose writer crashed or that was damaged later, and joins the pieces of a
+//! writer that crashed several times.
 
 mod error;
 mod folder;
@@ -25,59 +25,57 @@ use crate::whole_file::{self, Existing};
 pub use error::RepairError;
 pub use folder::{RepairedFolder, repair_folder, repaired_folder_path};
 
-/// Name of the metadata record that says what was repaired.
+/// Name of the metadata record with the repair report.
 const REPAIR: &str = "tauscope_repair";
-/// Name of the metadata record that rosbag2 looks for.
+/// Name of the metadata record that rosbag2 expects.
 const ROSBAG2: &str = "rosbag2";
-/// Chunks of a repaired file have at least this size, but for the last \[bytes\].
-/// Resolution: the file's size, against memory and what a damaged chunk costs.
+/// Minimum size of the chunks of a repaired file, except the last \[bytes\].
+/// Resolution: the file's size, against memory and the loss by a damaged chunk.
 const CHUNK_BYTES: usize = 1 << 20;
 
-/// What [`repair`] has made.
+/// Result of [`repair`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Repaired {
     /// The new file.
     pub written: Written,
-    /// The files that it was made from, in the order of their times.
+    /// The source files, in the order of their times.
     pub from: Vec<PathBuf>,
-    /// What of the old ones could not be taken over. Empty if they were whole.
+    /// Parts of the source files that could not be recovered. Empty if they were intact.
     pub damage: Vec<Damage>,
-    /// Where [`repair_in_place`] has put a damaged file, of which more than the torn end could not be taken over.
+    /// Path to which [`repair_in_place`] moved a damaged file that lost more than its torn end.
     pub set_aside: Option<PathBuf>,
 }
 
-/// Where [`repair`] puts its file: `a.repaired.mcap` beside `a.mcap` or `a.mcap.part`.
+/// Returns the default path of a repaired file: `a.repaired.mcap` next to `a.mcap` or `a.mcap.part`.
 pub fn repaired_path(path: &Path) -> PathBuf {
     path.with_file_name(format!("{}.repaired.mcap", stem(path)))
 }
 
-/// `a` of `a.mcap` and of `a.mcap.part`.
+/// Returns `a` for `a.mcap` and for `a.mcap.part`.
 fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let stem = name.strip_suffix(".part").unwrap_or(&name);
     stem.strip_suffix(".mcap").unwrap_or(stem).to_owned()
 }
 
-/// Writes all that can be read of the MCAP files `pieces` into the new file `to`: one piece after the
-/// other in the order of their times, each in the order in which it lies there, with a sound index,
-/// statistics and the metadata that rosbag2 looks for. A metadata record `tauscope_repair` says what
-/// was damaged. The pieces are not touched.
+/// Writes all readable data of the MCAP files `pieces` into the new file `to`. The pieces follow each other in the
+/// order of their times, each in its file order. The new file has a sound index, statistics and the metadata that
+/// rosbag2 expects. Its metadata record `tauscope_repair` lists the damage. The pieces are not modified.
 ///
 /// # Errors
-/// If one is no MCAP file, is being written or cannot be read from its first record, or `to` is there
-/// already or cannot be written.
+/// If a piece is not an MCAP file, is being written or cannot be read from its first record, or if `to` already
+/// exists or cannot be written.
 pub fn repair(pieces: &[impl AsRef<Path>], to: &Path) -> Result<Repaired, RepairError> {
     let part = whole_file::part_of(to);
     write(pieces, to, &part)
 }
 
-/// Repairs `part`, what a dead writer of `a.mcap` left as `a.mcap.part`, to `a.mcap`, or to the first
-/// of `a.1.mcap`, `a.2.mcap`, ... that is free. `part` is removed once the new file is on the disk, and
-/// only if nothing but its torn end is missing from that; else it becomes `a.mcap.damaged`, so that nobody takes it for
-/// one that waits to be repaired.
+/// Repairs `part`, the file `a.mcap.part` of a crashed writer of `a.mcap`. The result is `a.mcap`, or the first free
+/// name of `a.1.mcap`, `a.2.mcap`, ... Once the new file is on the disk, `part` is removed if only its torn end was
+/// lost. Otherwise it is renamed to `a.mcap.damaged`, so that it is not mistaken for an unrepaired file.
 ///
 /// # Errors
-/// As [`repair`]; `part` stays then.
+/// As [`repair`]; `part` is then kept.
 pub fn repair_in_place(part: &Path) -> Result<Repaired, RepairError> {
     let held = File::open(part).map_err(ArchiveError::io(part))?;
     if held.try_lock().is_err() {
@@ -110,7 +108,7 @@ fn write(pieces: &[impl AsRef<Path>], to: &Path, work: &Path) -> Result<Repaired
     write_held(pieces, to, work)
 }
 
-/// As [`repair`], by way of the unfinished file `work`, of pieces that nobody writes.
+/// Like [`repair`], through the unfinished file `work`, for pieces that are not being written.
 fn write_held(
     pieces: &[impl AsRef<Path>],
     to: &Path,
@@ -182,10 +180,10 @@ fn layout(path: &Path) -> Result<Layout, RepairError> {
 struct Copy {
     writer: mcap::Writer<BufWriter<File>>,
     part: PathBuf,
-    /// By channel of the new file.
+    /// Topics by channel of the new file.
     topics: BTreeMap<u16, BagTopic>,
     log_times_ns: Option<(i64, i64)>,
-    /// Records that are in the new file.
+    /// Metadata records in the new file.
     metadata: Vec<Metadata>,
     damage: Vec<Damage>,
 }
@@ -199,8 +197,8 @@ impl Copy {
         Ok(self.metadata(layout)?)
     }
 
-    /// Schemas and channels: those of the first piece with the numbers they had, of each further one
-    /// those that are new. Gives the new number of each channel.
+    /// Declares the schemas and channels: those of the first piece with their old numbers, and the new ones of each
+    /// further piece. Returns the new number of each channel.
     fn declare(&mut self, layout: &Layout) -> Result<BTreeMap<u16, u16>, WriteError> {
         let first = self.topics.is_empty();
         let mut schemas = BTreeMap::new();
@@ -215,7 +213,7 @@ impl Copy {
         }
         let mut channels = BTreeMap::new();
         for (&id, channel) in &layout.channels {
-            // A schema that lay behind the tear is gone.
+            // A schema behind the torn end is lost.
             let schema = schemas.get(&channel.schema_id).copied().unwrap_or(0);
             let (topic, encoding) = (&channel.topic, &channel.message_encoding);
             let metadata = &channel.metadata;
@@ -341,7 +339,8 @@ impl Copy {
         Ok(())
     }
 
-    /// The metadata records of a piece, but for what pieces before have said and what is said anew.
+    /// Copies the metadata records of a piece, except those of earlier pieces and the `rosbag2` record, which is
+    /// rewritten.
     fn metadata(&mut self, layout: &Layout) -> Result<(), WriteError> {
         for metadata in &layout.metadata {
             if metadata.name != ROSBAG2 && !self.metadata.contains(metadata) {

@@ -61,18 +61,18 @@ pub trait Message: Serialize + DeserializeOwned + Default {
         text
     }
 
-    /// What the type itself does not say: stamps are not negative, arrays fit together.
+    /// Checks the rules that the type does not express: stamps are not negative, the lengths of arrays match.
     ///
     /// # Errors
-    /// The first rule that is broken.
+    /// The first rule that is violated.
     fn check(&self) -> Result<(), DecodeError> {
         Ok(())
     }
 
-    /// Reads the message over what is in `self`, so that a reader can use its memory again.
+    /// Reads the message into `self`, so that its memory is reused.
     ///
     /// # Errors
-    /// What the bytes lack; `self` is then half overwritten.
+    /// If the bytes do not hold the fields; `self` is then partly overwritten.
     fn read<BO: byteorder::ByteOrder>(
         &mut self,
         from: &mut cdr_encoding::CdrDeserializer<'_, BO>,
@@ -81,8 +81,9 @@ pub trait Message: Serialize + DeserializeOwned + Default {
         Ok(())
     }
 
-    /// Reads the little-endian `fields` over `self` if nothing but numbers differs from the message that is there, which
-    /// is faster than [`Message::read`] and gives the same. False if it is not so, or not known; `self` is then void.
+    /// Reads the little-endian `fields` into `self`, if only numbers differ from the message in `self`. This is
+    /// faster than [`Message::read`] with the same result. Returns `false` if more differs or the type does not
+    /// support it; the content of `self` is then undefined.
     fn read_alike(&mut self, _fields: &[u8]) -> bool {
         false
     }

@@ -1,7 +1,7 @@
 //! Reading bags of ROS 1, version 2.0 (<http://wiki.ros.org/Bags/Format/2.0>), chunk by chunk.
 //!
-//! [`Ros1Bag::read`] learns what the bag holds and where: from the index at its end if that is sound, else by walking
-//! all of it. What a bag declares of its own sizes is checked against the file and a limit before memory is taken.
+//! [`Ros1Bag::read`] finds the contents of the bag from the index at its end if that is sound, and otherwise by
+//! reading all of it. A declared size is checked against the file and a limit before memory is allocated.
 
 mod chunk;
 mod cursor;
@@ -20,24 +20,24 @@ use crate::topic::{Topic, Topics};
 pub(crate) use cursor::ros1_cursor;
 use record::{Header, Records, Step, op};
 
-/// How bags of every version begin.
+/// First bytes of a bag of any version.
 pub(crate) const MAGIC: &[u8] = b"#ROSBAG V";
-/// How those of this version begin.
+/// First bytes of a bag of version 2.0.
 const VERSION: &[u8] = b"#ROSBAG V2.0\n";
 /// Longest record other than a chunk that is read \[bytes\].
 /// Resolution: bounds memory.
 const MAX_RECORD_BYTES: u64 = 64 << 20;
-/// Most connections (publishers of a topic) of a bag.
+/// Maximum number of connections (publishers of a topic) of a bag.
 /// Resolution: bounds time; a robot has some hundreds.
 const MAX_CONNECTIONS: usize = 4096;
-/// Most chunks of a bag.
+/// Maximum number of chunks of a bag.
 /// Resolution: bounds memory; with rosbag's chunks of 768 KiB it is 3 TiB.
 const MAX_CHUNKS: usize = 4 << 20;
-/// Most damages of a bag that are told.
+/// Maximum number of damages reported for a bag.
 /// Resolution: bounds memory.
 const MAX_DAMAGES: usize = 1000;
 
-/// What a bag holds, and where.
+/// Contents of a bag, with their positions.
 #[derive(Debug)]
 pub(crate) struct Ros1Bag {
     pub(crate) path: PathBuf,
@@ -58,24 +58,24 @@ struct Connection {
     message_count: u64,
 }
 
-/// Where messages lie.
+/// Position, time range and connections of a chunk.
 #[derive(Debug)]
 struct Chunk {
-    /// Where its record begins.
+    /// File offset of its record.
     at: u64,
     start_ns: u64,
     end_ns: u64,
-    /// Whose messages it holds.
+    /// Connections with messages in it.
     connections: Vec<u32>,
-    /// The file ends within it.
+    /// Whether the file ends within it.
     torn: bool,
 }
 
 impl Ros1Bag {
-    /// Reads what the bag at `path` holds.
+    /// Reads the contents of the bag at `path`.
     ///
     /// # Errors
-    /// If it cannot be opened, or its first record makes no sense.
+    /// If it cannot be opened, or its first record is malformed.
     pub(crate) fn read(path: &Path) -> Result<Self, ArchiveError> {
         let unreadable = |reason| ArchiveError::Unreadable {
             path: path.to_owned(),
@@ -95,7 +95,7 @@ impl Ros1Bag {
         Ok(bag)
     }
 
-    /// In words, why its beginning makes no sense.
+    /// Reads the contents of `file`. The inner error is the reason why its beginning is invalid.
     fn read_from(&mut self, file: File) -> io::Result<Result<(), String>> {
         self.file_bytes = file.metadata()?.len();
         let mut records = Records::new(file, self.file_bytes);
@@ -140,12 +140,12 @@ impl Ros1Bag {
         Ok(Ok(()))
     }
 
-    /// How many chunks it has.
+    /// Returns the number of chunks.
     pub(crate) fn chunks(&self) -> u64 {
         self.chunks.len() as u64
     }
 
-    /// The topics, and the place among them of each connection.
+    /// Returns the topics, and the index of the topic of each connection.
     pub(crate) fn topics(&self) -> (Topics, BTreeMap<u32, usize>) {
         let mut topics = Topics::default();
         let places = self.connections.iter().map(|(&number, connection)| {
@@ -156,7 +156,7 @@ impl Ros1Bag {
         (topics, places)
     }
 
-    /// Takes in a connection's record; `Err` if it makes no sense, in words.
+    /// Adds a connection from its record. The error is the reason why the record is invalid.
     fn connect(&mut self, header: Header<'_>, data: &[u8]) -> Result<(), String> {
         let number = header.u32("conn").ok_or("a connection without a number")?;
         let text =
@@ -170,7 +170,7 @@ impl Ros1Bag {
                 "more than {MAX_CONNECTIONS} connections, which is the limit"
             ));
         }
-        // What a node was remapped to stands outside, what it calls the topic itself inside.
+        // The header has the topic after remapping, the data have the name in the publisher's code.
         let topic = header.get("topic").or_else(|| of.get("topic"));
         let connection = Connection {
             topic: text(topic),
@@ -182,7 +182,7 @@ impl Ros1Bag {
         Ok(())
     }
 
-    /// Takes in a chunk that holds so many messages of each connection.
+    /// Adds a chunk, with its number of messages by connection.
     fn add(&mut self, chunk: Chunk, counts: &BTreeMap<u32, u64>) -> Result<(), String> {
         if self.chunks.len() == MAX_CHUNKS {
             return Err(format!("more than {MAX_CHUNKS} chunks, which is the limit"));

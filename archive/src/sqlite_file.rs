@@ -10,13 +10,13 @@ use crate::damage::{Damage, DamageKind};
 use crate::error::ArchiveError;
 use crate::topic::Topic;
 
-/// How every SQLite database begins.
+/// First bytes of a SQLite database.
 pub(crate) const MAGIC: &[u8] = b"SQLite format 3\0";
-/// Messages are read in pages of about this size \[bytes\]; a page holds at least one.
+/// Approximate size of the messages read at once \[bytes\]; at least one message is read.
 /// Resolution: memory against the number of reads.
 const PAGE_BYTES: usize = 4 << 20;
 
-/// A database that has been looked through.
+/// A database whose topics and messages have been counted.
 #[derive(Debug)]
 pub(crate) struct SqliteFile {
     path: PathBuf,
@@ -100,7 +100,7 @@ impl SqliteFile {
         self.log_times_ns = Some((start_ns.min(first_ns), end_ns.max(last_ns)));
     }
 
-    /// Over the topics to which `topic` gives a number, by their number in the database.
+    /// Creates a cursor over the topics for which `topic` returns a number, by their number in the database.
     pub(crate) fn cursor(
         &self,
         topic: impl Fn(i64) -> Option<usize>,
@@ -137,7 +137,7 @@ fn connect(path: &Path, torn: bool) -> Result<Connection, ArchiveError> {
             path,
             OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX,
         )?;
-        // A view or a trigger of a stranger's may run for ever, or call what it should not.
+        // A view or a trigger of an untrusted file may run forever, or call unsafe functions.
         connection.pragma_update(None, "trusted_schema", false)?;
         if torn {
             // Without it, SQLite refuses a file that is shorter than its header says.
@@ -151,7 +151,7 @@ fn connect(path: &Path, torn: bool) -> Result<Connection, ArchiveError> {
     })
 }
 
-/// Refuses what rosbag2 never writes: a view in the place of a table may run for ever.
+/// Rejects anything but plain tables. rosbag2 writes nothing else, and a view may run forever.
 fn are_tables(connection: &Connection, path: &Path) -> Result<(), ArchiveError> {
     let kind = |name: &str| {
         connection.query_row(
@@ -162,7 +162,7 @@ fn are_tables(connection: &Connection, path: &Path) -> Result<(), ArchiveError> 
         )
     };
     for name in ["topics", "messages"] {
-        // That there is none, or that it cannot be read, is told by whoever reads it.
+        // A missing or unreadable table is reported when it is read.
         match kind(name) {
             Ok(kind) if kind != "table" => {
                 return Err(ArchiveError::Unreadable {
@@ -198,13 +198,13 @@ fn topics(connection: &Connection) -> rusqlite::Result<Vec<(i64, Topic)>> {
     statement.query_map([], topic)?.collect()
 }
 
-/// In which order rows are to be had.
+/// Order in which rows are read.
 enum Order {
     /// By time, through the table's index.
     Index,
     /// By time, through a temporary table: bags of the first ROS 2 distributions have no index.
     TemporaryTable,
-    /// As they were written: all that a broken database is good for.
+    /// In the order of writing, the only one for a damaged database.
     Row,
 }
 
@@ -233,7 +233,7 @@ impl Order {
         Ok(Self::TemporaryTable)
     }
 
-    /// Gives key, topic, time and data of the rows after the time `?1` and the key `?2`.
+    /// Returns the query for key, topic, time and data of the rows after the time `?1` and the key `?2`.
     fn query(&self, topics: &[(i64, usize)]) -> String {
         let wanted = in_topics(topics);
         match self {
@@ -265,12 +265,12 @@ pub(crate) struct SqliteCursor {
     topics: Vec<(i64, usize)>,
     /// Time and key of the last row that was read.
     after: (i64, i64),
-    /// Rows read and not given yet, the next one last.
+    /// Rows read and not returned yet, the next one last.
     page: Vec<PageRow>,
     bytes: Vec<u8>,
     current: Option<PageRow>,
     ended: bool,
-    /// Told when the database was opened; not to be told again.
+    /// Whether the damage was reported when the database was opened, so that it is not reported again.
     damage_is_known: bool,
 }
 
@@ -327,7 +327,7 @@ impl Cursor for SqliteCursor {
         self.current = None;
         if self.page.is_empty() && !self.ended {
             if let Err(error) = self.read_page() {
-                // The rows of this page that came before it are still to be given.
+                // The rows of this page before the error are still returned.
                 self.page.reverse();
                 self.ended = true;
                 if !self.damage_is_known {

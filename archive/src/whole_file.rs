@@ -1,9 +1,8 @@
-//! Files that have their name only once they are whole.
+//! Atomic writing of files.
 //!
-//! A file is written beside its name, with `.part` at the end, and gets its name when nothing is
-//! missing any more. So a file with its proper name is complete, and a writer that died leaves a
-//! `.part` and nothing else. A program that ends on purpose takes its own unfinished files with it
-//! ([`remove_unfinished`]).
+//! A file is written under its name with `.part` appended, and renamed when it is complete. So a file with its final
+//! name is complete, and a writer that crashed leaves only a `.part`. A program that ends on purpose removes its own
+//! unfinished files ([`remove_unfinished`]).
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -17,32 +16,32 @@ use rustix::io::Errno;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What becomes of a file that already has the name.
+/// Policy for a file that already has the name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Existing {
-    /// It stays as it is.
+    /// The existing file is kept.
     #[default]
     Keep,
-    /// The new file takes its place.
+    /// The new file replaces it.
     Replace,
 }
 
-/// The `.part` files that this process has begun and not finished.
+/// The `.part` files that this process has created and not finished.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// The folders that this process has made, each after the one that it is in.
+/// The folders that this process has created, each after its parent.
 static FOLDERS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// Nothing in here can be left half done, so a panic elsewhere does not matter.
+/// Locks the set of unfinished files. A poisoned lock is harmless, because no update of the set is interrupted.
 fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Opens `part`, which this process begins to write. In one step, so that no [`remove_unfinished`] comes between.
+/// Opens `part` and registers it as unfinished, atomically with respect to [`remove_unfinished`].
 ///
 /// # Errors
-/// If it cannot be opened so; then it is none of this process's files.
+/// If it cannot be opened; it is then not registered.
 pub fn create(part: &Path, options: &OpenOptions) -> io::Result<File> {
     let mut unfinished = unfinished();
     let file = options.open(part)?;
@@ -54,24 +53,24 @@ fn end(part: &Path) {
     unfinished().remove(part);
 }
 
-/// `path` is there, but belongs to a result that is not whole yet: until [`keep`] it counts as unfinished.
+/// Registers the existing `path` as part of an incomplete result: until [`keep`] it is treated as unfinished.
 pub fn is_part_of_unfinished(path: &Path) {
     unfinished().insert(path.to_owned());
 }
 
-/// `path` belongs to a result that is whole now.
+/// Marks `path` as part of a complete result.
 pub fn keep(path: &Path) {
     end(path);
 }
 
-/// Removes what this process has begun and not finished: what it would have held is made again by doing
-/// the same again. Not for recordings of a live robot.
+/// Removes the files that this process has created and not finished, for results that a second run produces again.
+/// Not for recordings of a live robot.
 pub fn remove_unfinished() {
     remove(&mut unfinished());
 }
 
-/// The program leaves: as [`remove_unfinished`], and while the result lives no other thread begins a file or gives one
-/// its name, but waits.
+/// Removes unfinished files before the program exits, like [`remove_unfinished`]. While the returned guard lives,
+/// other threads block when they create or rename a file.
 #[must_use = "others go on to write once it is gone"]
 pub fn remove_unfinished_and_leave() -> Leaving {
     let mut unfinished = unfinished();
@@ -79,7 +78,7 @@ pub fn remove_unfinished_and_leave() -> Leaving {
     Leaving(unfinished)
 }
 
-/// Keeps others from beginning to write.
+/// Guard that prevents other threads from creating and renaming files.
 #[derive(Debug)]
 pub struct Leaving(
     #[expect(dead_code, reason = "it is held, not read")] MutexGuard<'static, BTreeSet<PathBuf>>,
@@ -87,17 +86,17 @@ pub struct Leaving(
 
 fn remove(unfinished: &mut BTreeSet<PathBuf>) {
     for part in std::mem::take(unfinished) {
-        // One that is not there any more need not be removed.
+        // A file that no longer exists need not be removed.
         let _ = fs::remove_file(part);
     }
     let mut made = FOLDERS.lock().unwrap_or_else(PoisonError::into_inner);
-    // The deepest first. One that holds anything stays.
+    // The deepest first. A folder that is not empty stays.
     for folder in std::mem::take(&mut *made).iter().rev() {
         let _ = fs::remove_dir(folder);
     }
 }
 
-/// Removes `part`, which this process has begun and does not need any more.
+/// Removes `part`, which this process has created and no longer needs.
 ///
 /// # Errors
 /// If it cannot be removed.
@@ -107,18 +106,18 @@ pub fn discard(part: &Path) -> io::Result<()> {
     removed
 }
 
-/// What a file is called until it is whole: `a.mcap.part` for `a.mcap`.
+/// Returns the name of a file until it is complete: `a.mcap.part` for `a.mcap`.
 pub fn part_of(path: &Path) -> PathBuf {
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
     part.into()
 }
 
-/// Writes a file whole, and its folder if there is none.
+/// Writes a complete file, and creates its folder if necessary.
 ///
 /// # Errors
-/// If it cannot be written; [`io::ErrorKind::AlreadyExists`] if there is a file of that name and it
-/// is to be kept. No `.part` stays.
+/// If it cannot be written; [`io::ErrorKind::AlreadyExists`] if there is a file of that name and it is to be kept. No
+/// `.part` remains.
 pub fn write(path: &Path, contents: impl AsRef<[u8]>, existing: Existing) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         create_folder(folder)?;
@@ -135,15 +134,14 @@ pub fn write(path: &Path, contents: impl AsRef<[u8]>, existing: Existing) -> io:
     });
     let placed = written.and_then(|()| put_in_place(&part, path, existing));
     if placed.is_err() {
-        // Whatever it was that failed is what the caller is told.
+        // The caller gets the first error, not that of the removal.
         let _ = fs::remove_file(&part);
         end(&part);
     }
     placed
 }
 
-/// Gives the finished `part` its name, in one step that no other process can come between, and makes
-/// it outlast a power cut.
+/// Renames the finished `part` to `path` atomically, and syncs the folder so that the name survives a power failure.
 ///
 /// # Errors
 /// If it cannot be renamed; [`io::ErrorKind::AlreadyExists`] if there is a file of that name and it
@@ -159,10 +157,10 @@ pub fn put_in_place(part: &Path, path: &Path, existing: Existing) -> io::Result<
     sync_folder_of(path)
 }
 
-/// Makes it outlast a power cut that `path` is there, has its name, or is gone.
+/// Syncs the folder of `path`, so that its creation, renaming or removal survives a power failure.
 ///
 /// # Errors
-/// If the folder that it is in cannot be opened or synced.
+/// If the folder cannot be opened or synced.
 pub fn sync_folder_of(path: &Path) -> io::Result<()> {
     match path.parent() {
         Some(folder) if folder != Path::new("") => File::open(folder)?.sync_all(),
@@ -170,10 +168,10 @@ pub fn sync_folder_of(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Makes `folder`, and those above it, where they are missing; they outlast a power cut.
+/// Creates `folder` and its missing parents, and syncs them so that they survive a power failure.
 ///
 /// # Errors
-/// If it cannot be made.
+/// If it cannot be created.
 pub fn create_folder(folder: &Path) -> io::Result<()> {
     if folder == Path::new("") || folder.is_dir() {
         return Ok(());
@@ -194,20 +192,19 @@ pub fn create_folder(folder: &Path) -> io::Result<()> {
     }
 }
 
-/// Says to all other processes that `part`, which has just been made, is being written: for as long
-/// as it is open.
+/// Locks the new file `part`, so that other processes see that it is being written while it is open.
 ///
 /// # Errors
 /// If the file system fails.
 pub fn hold(part: &File) -> io::Result<()> {
     match part.lock() {
-        // Some network file systems know no locks.
+        // Some network file systems do not support locks.
         Err(error) if error.kind() == io::ErrorKind::Unsupported => Ok(()),
         locked => locked,
     }
 }
 
-/// Whether a writer of `part` lives.
+/// Returns whether a process is writing `part`.
 ///
 /// # Errors
 /// If the file cannot be opened.
@@ -219,12 +216,12 @@ pub fn is_being_written(part: &Path) -> io::Result<bool> {
     ))
 }
 
-/// Whether this user may make files in `folder`, or make that where it is not there yet.
+/// Checks that this user may create files in `folder`, or create `folder` if it does not exist.
 ///
 /// # Errors
-/// What keeps from it, in the operating system's words.
+/// The operating system's error if not.
 pub fn check_writable(folder: &Path) -> io::Result<()> {
-    // Without the slash at its end, with which a file is said not to be there.
+    // Without a trailing slash, with which `exists` is false for a file.
     let folder: PathBuf = folder.components().collect();
     let there = folder.ancestors().find(|above| above.exists());
     let there = there
@@ -236,7 +233,7 @@ pub fn check_writable(folder: &Path) -> io::Result<()> {
     if is_made_by_the_kernel(there)? {
         return Err(io::ErrorKind::ReadOnlyFilesystem.into());
     }
-    // The effective user: what a service may not do, its file's owner may.
+    // Check the effective user, not the real one: its rights apply to the writes.
     Ok(rustix::fs::accessat(
         CWD,
         there,
@@ -245,19 +242,20 @@ pub fn check_writable(folder: &Path) -> io::Result<()> {
     )?)
 }
 
-/// Whether the file system at `folder` shows what the kernel knows and keeps no files.
+/// Returns whether the file system at `folder` is procfs or sysfs, which store no files.
 fn is_made_by_the_kernel(folder: &Path) -> io::Result<bool> {
-    /// Of sysfs. Physical: the number that Linux gives it.
+    /// Magic number of sysfs.
+    /// Physical: defined by Linux.
     const SYSFS_MAGIC: i128 = 0x6265_6572;
-    // Its width differs from machine to machine.
+    // The width of `f_type` depends on the architecture.
     let kind = i128::from(rustix::fs::statfs(folder)?.f_type);
     Ok(kind == i128::from(rustix::fs::PROC_SUPER_MAGIC) || kind == SYSFS_MAGIC)
 }
 
-/// Bytes that an ordinary user may still write on the disk of `path`, which need not be there yet.
+/// Returns the free space for an unprivileged user on the disk of `path`, which need not exist yet \[bytes\].
 ///
 /// # Errors
-/// If the file system does not say.
+/// If the file system does not report it.
 pub fn free_bytes(path: &Path) -> io::Result<u64> {
     let there = path.ancestors().find(|above| above.exists());
     let there = there.filter(|above| *above != Path::new(""));
@@ -265,7 +263,7 @@ pub fn free_bytes(path: &Path) -> io::Result<u64> {
     Ok(room.f_bavail.saturating_mul(room.f_frsize))
 }
 
-/// The first of `a.mcap`, `a.1.mcap`, `a.2.mcap`, ... that no file has.
+/// Returns the first of `a.mcap`, `a.1.mcap`, `a.2.mcap`, ... that does not exist.
 ///
 /// # Errors
 /// If the folder cannot be read.
@@ -278,12 +276,12 @@ pub fn unused_name(path: &Path) -> io::Result<PathBuf> {
     Ok(name)
 }
 
-/// Moves the `.part` that a dead writer of `path` left behind to `a.1.mcap.part`, `a.2.mcap.part`, ...:
-/// it may hold the only copy of a recording. Gives its new name, if there was one.
+/// Renames the `.part` of a crashed writer of `path` to the first free name of `a.1.mcap.part`, `a.2.mcap.part`, ...
+/// It may be the only copy of a recording. Returns its new name, if there was one.
 ///
 /// # Errors
-/// If the folder cannot be read or the file not be renamed; [`io::ErrorKind::ResourceBusy`] if its
-/// writer lives.
+/// If the folder cannot be read or the file cannot be renamed; [`io::ErrorKind::ResourceBusy`] if a process is still
+/// writing it.
 pub fn set_part_aside(path: &Path) -> io::Result<Option<PathBuf>> {
     let part = part_of(path);
     if !part.try_exists()? {
@@ -297,7 +295,7 @@ pub fn set_part_aside(path: &Path) -> io::Result<Option<PathBuf>> {
     loop {
         let name = numbered(path, n);
         let aside = part_of(&name);
-        // Where the one before has been repaired, its name is taken.
+        // A repaired earlier file may have taken `name`.
         if !aside.try_exists()? && !name.try_exists()? {
             rename_to_new(&part, &aside)?;
             return Ok(Some(aside));
@@ -306,11 +304,11 @@ pub fn set_part_aside(path: &Path) -> io::Result<Option<PathBuf>> {
     }
 }
 
-/// Renames `a.mcap.part`, all of which that can be read is in another file, to `a.mcap.damaged`, or to the first of
-/// `a.1.mcap.damaged`, ... that is free; gives its new name.
+/// Renames `a.mcap.part`, whose readable data are in another file, to `a.mcap.damaged`, or to the first free name of
+/// `a.1.mcap.damaged`, ... Returns its new name.
 ///
 /// # Errors
-/// If the folder cannot be read or synced, or the file not be renamed.
+/// If the folder cannot be read or synced, or the file cannot be renamed.
 pub fn set_damaged_aside(part: &Path) -> io::Result<PathBuf> {
     let whole = part.with_extension("");
     let named = |name: &Path| {
@@ -328,7 +326,7 @@ pub fn set_damaged_aside(part: &Path) -> io::Result<PathBuf> {
     Ok(damaged)
 }
 
-/// `a.3.mcap` for `a.mcap` and 3.
+/// Returns `a.3.mcap` for `a.mcap` and 3.
 fn numbered(path: &Path, n: u32) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push(format!(".{n}"));
@@ -341,7 +339,7 @@ fn numbered(path: &Path, n: u32) -> PathBuf {
 
 fn rename_to_new(part: &Path, path: &Path) -> io::Result<()> {
     match renameat_with(CWD, part, CWD, path, RenameFlags::NOREPLACE) {
-        // Some network file systems know no such rename.
+        // Some network file systems do not support this flag.
         Err(Errno::INVAL | Errno::NOSYS) => {
             if path.try_exists()? {
                 return Err(io::ErrorKind::AlreadyExists.into());

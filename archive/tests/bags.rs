@@ -13,7 +13,7 @@ use tauscope_archive::{
     ArchiveError, Compression, Damage, DamageKind, Info, McapWriter, Recording, RecordingKind,
 };
 
-/// How rosbag2 lays out its database.
+/// Schema and topics of a rosbag2 database.
 pub const TABLES: &str = "
     CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
         serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);
@@ -43,7 +43,7 @@ fn database(path: &Path, range: std::ops::Range<i64>, tables: &str) {
     connection.execute_batch("COMMIT").unwrap();
 }
 
-/// A joint state as `ros2_control` tells it, with a sensor behind the joints; joint `b` has no effort.
+/// A joint state as `ros2_control` publishes it, with a sensor after the joints; joint `b` has no effort.
 fn dynamic(i: i64) -> ros::DynamicJointState {
     let state = state(i);
     let interfaces = |named: &[(&str, f64)]| ros::InterfaceValue {
@@ -92,7 +92,7 @@ fn dynamic_joint_states_read_as_joint_states_out_of_every_bag() {
         assert!(info.position && info.effort && !info.velocity);
         assert!(info.joints[1].lacks_effort);
     }
-    // What is no joint state is refused with the types that would be one.
+    // A topic of another type is rejected, with the types that are accepted.
     let other = write(&folder.path().join("other.mcap"), Compression::None, 20);
     let Err(error) = Recording::open(other).unwrap().joint_states("/contact") else {
         panic!("a flag is no joint state");

@@ -156,7 +156,7 @@ fn bytes_are_laid_out_as_cdr_says() {
     assert_eq!(body, LITTLE);
     assert_eq!(decode::<JointState>(LITTLE).unwrap(), state);
 
-    // The same in big endian: every number turned round, texts not.
+    // Big endian: the bytes of every number are reversed, those of texts are not.
     let mut big = LITTLE.to_vec();
     big[1] = 0;
     let numbers = [4, 8, 12, 20, 24, 32, 40, 60, 64].map(|at| at..at + 4);

@@ -76,7 +76,7 @@ fn rows_are_joint_states() {
     }
     assert_eq!(rows[0], (500_000_000, 1.0, 2.0, 3.0));
     assert!((rows[1].1 - 4.0).abs() < 1e-12);
-    // What is not there is NaN, for the reader to drop and to count.
+    // A missing value is NaN, which the reader drops and counts.
     assert!(rows[1].3.is_nan() && rows[2].2.is_nan());
     assert_eq!(rows.len(), 3);
 }

@@ -386,7 +386,7 @@ proptest! {
         }
         fs::write(&path, bytes).unwrap();
         if let Ok(recording) = Recording::open(&path) {
-            // What was counted may not be what is read if the index lies, but it ends.
+            // With a wrong index the counts may differ from the messages read, but reading ends.
             let mut messages = recording.all_messages().unwrap();
             while let Some(message) = messages.next_message() {
                 if let Ok(message) = message {

@@ -1,6 +1,6 @@
 //! Parquet tables that declare more than they hold: refused with a reason, and without the memory that they ask for.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::fs;
 use std::path::Path;
@@ -66,7 +66,7 @@ impl Struct {
     }
 }
 
-/// What a table declares: numbers at these places.
+/// Numbers that a table declares, at the following indices.
 type Declared = [i64; 6];
 const ROWS: usize = 0;
 const GROUPS: usize = 1;

@@ -1,4 +1,4 @@
-//! What is said of a recording.
+//! The summary of a recording.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 

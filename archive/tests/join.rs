@@ -34,7 +34,7 @@ fn written(path: &Path, range: std::ops::Range<i64>, made_by: &str) -> PathBuf {
     writer.finish().unwrap().path
 }
 
-/// The same, torn off before its end.
+/// Writes such a file truncated before its end.
 fn torn(path: &Path, range: std::ops::Range<i64>) -> PathBuf {
     let whole = written(&path.with_extension("whole"), range, "us");
     let bytes = fs::read(&whole).unwrap();
@@ -71,7 +71,7 @@ fn pieces_are_joined_in_the_order_of_their_times() {
     assert_eq!(all.len() as u64, repaired.written.messages);
     assert!(all.is_sorted() && all.len() > 250, "{}", all.len());
     assert_eq!(all[all.len() - 100..].first(), Some(&400.0));
-    // What rosbag2 reads instead of a `metadata.yaml`.
+    // The metadata that rosbag2 reads instead of a `metadata.yaml`.
     let recording = Recording::open(&to).unwrap();
     let bag = &recording.metadata()["rosbag2"]["serialized_metadata"];
     assert!(

@@ -1,7 +1,7 @@
-//! Episodes of LeRobot data sets. `data/lerobot_sets.py` makes them; `tests/formats.rs` of the program compares what the
-//! commands find in one with what they find in MCAP.
+//! Episodes of LeRobot data sets, made by `data/lerobot_sets.py`. `tests/formats.rs` of the program compares the
+//! results of the commands for an episode with those for MCAP.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,7 @@ fn change_info(root: &Path, from: &str, to: &str) {
     fs::write(path, text.replace(from, to)).unwrap();
 }
 
-/// What `lerobot_sets.py` writes into an element.
+/// Value that `lerobot_sets.py` writes into an element.
 fn value(episode: usize, row: usize, element: usize) -> f64 {
     (0.1 * row as f64 + element as f64 + episode as f64).sin()
 }

@@ -1,6 +1,6 @@
 //! LeRobot data sets that are broken or incomplete: what is wrong is named, with its place.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! What `McapWriter` writes.
+//! Output of `McapWriter`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -102,7 +102,7 @@ fn an_unfinished_file_is_a_part_that_holds_all_but_the_open_chunk() {
     }
     let part = folder.path().join("deeper/a.mcap.part");
     assert!(!path.exists());
-    // What a kill would leave: a copy taken while the writer is at work.
+    // The file that a killed writer leaves: a copy taken while the writer is running.
     let copy = folder.path().join("copy.mcap.part");
     fs::copy(&part, &copy).unwrap();
     let recording = Recording::open(&copy).unwrap();

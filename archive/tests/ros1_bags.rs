@@ -24,7 +24,7 @@ fn changed(folder: &Path, change: impl FnOnce(&mut Vec<u8>)) -> PathBuf {
     path
 }
 
-/// Where `what` begins for the `n`-th time.
+/// Returns the offset of the `n`-th occurrence of `what`, counted from 0.
 fn find(bytes: &[u8], what: &[u8], n: usize) -> usize {
     let mut places = (0..bytes.len()).filter(|&at| bytes[at..].starts_with(what));
     places.nth(n).unwrap()
@@ -83,7 +83,7 @@ fn joint_states_and_flags_come_out_of_every_compression_in_order_of_time() {
             told.push(flag.unwrap().decode::<Bool>().unwrap().data);
         }
         assert_eq!(told, [true, false, true, false, true]);
-        // What is not converted is still given, as it is.
+        // Messages that are not converted are returned unchanged.
         let (all, lost) = read_all(&recording);
         assert_eq!((all.len(), lost), (65, 0));
         let text = all

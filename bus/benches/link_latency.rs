@@ -1,14 +1,15 @@
-//! Round-trip latency of a link between two processes, beside bare iceoryx2 with the same payload.
+//! Round-trip latency of a link between two processes, compared with bare iceoryx2 with the same payload.
 //!
 //! `cargo bench -p tauscope-bus --bench link_latency`
 //!
-//! - `bare, polling`: a publisher and a subscriber each way, both sides spinning: the floor.
-//! - `bare, waiting`: the same, where the reader sleeps until an event says that a sample was sent.
-//! - `link, shared memory`: our link, which waits in the same way.
-//! - `bare zenoh`: publishers and subscribers of Zenoh alone, over TCP on the loopback device: the floor of the next.
-//! - `link, zenoh`: our link over TCP on the loopback device.
+//! - `bare, polling`: a publisher and a subscriber each way, both sides spinning: the lower bound.
+//! - `bare, waiting`: the same, but the reader sleeps until an event notifies it of a sample.
+//! - `link, shared memory`: a link, which waits in the same way.
+//! - `bare zenoh`: publishers and subscribers of Zenoh alone, over TCP on the loopback device: the lower bound for
+//!   `link, zenoh`.
+//! - `link, zenoh`: a link over TCP on the loopback device.
 
-// Without what it measures over, a measurement has no more to say.
+// A measurement without its transport is void, so the benchmark may panic.
 #![allow(clippy::unwrap_used)]
 
 use std::process::{Child, Command};
@@ -153,7 +154,7 @@ fn open(way: &str, place: &str, send: &str, receive: &str) -> Box<dyn Side> {
 struct Linked<L> {
     sender: Box<dyn Sender<TwinState>>,
     receiver: Box<dyn Receiver<TwinState>>,
-    /// Whose session ends with it.
+    /// Keeps the session open.
     _links: L,
 }
 
@@ -163,7 +164,7 @@ impl<L: Transport> Linked<L> {
         let one = Audience::of(Keep::All, 1);
         let mut sender: Box<dyn Sender<TwinState>> = links.sender(send, one).unwrap();
         let deadline = Instant::now() + LONG;
-        // The side that answers is heard once it is asked.
+        // A receiver in shared memory acknowledges new senders only within `receive`.
         while send == "ping" && sender.wait_for_receivers(Duration::from_millis(5)).unwrap() > 0 {
             assert!(Instant::now() < deadline, "the other side does not come");
             receiver
@@ -216,7 +217,7 @@ impl Side for Bare {
     }
 }
 
-/// Publisher and subscriber of one session, and nothing else: no numbers, no log, no thread of ours.
+/// Publisher and subscriber of one session, without sequence numbers, retransmission window or thread.
 struct BareZenoh {
     publisher: zenoh::pubsub::Publisher<'static>,
     received: mpsc::Receiver<i64>,

@@ -1,39 +1,40 @@
-//! How far the clock of another computer is ahead of this one's: the measurement of the Network Time Protocol (D. Mills
-//! et al., RFC 5905, 2010, sections 8 and 10), over whatever carries a question and its answer.
+//! Clock offset of another computer, measured as in the Network Time Protocol (D. Mills et al., RFC 5905, 2010,
+//! sections 8 and 10), over any transport that carries a request and its response.
 
 use std::collections::VecDeque;
 
-/// Measurements that are kept, of which the surest counts: the clock filter's eight (RFC 5905, section 10).
+/// Measurements in the clock filter, of which the one with the smallest uncertainty is used (RFC 5905, section 10).
 const KEPT: usize = 8;
-/// Physical: a clock that nobody keeps drifts by up to so much \[ns of error a second of age\] (PHI, RFC 5905, section 4).
+/// Largest drift of an undisciplined clock \[ns of error per second of age\].
+/// Physical: PHI of RFC 5905, section 4.
 const DRIFT_NS_PER_S: f64 = 15_000.0;
 
-/// A question and its answer: the four times of section 8.
+/// The four timestamps of a request and its response (RFC 5905, section 8).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RoundTrip {
-    /// When it was asked, by this computer's clock \[ns since the epoch\].
+    /// T1: departure of the request, by this computer's clock \[ns since the epoch\].
     pub asked_ns: i64,
-    /// When the question came, by the other's clock \[ns since the epoch\].
+    /// T2: arrival of the request, by the other clock \[ns since the epoch\].
     pub received_ns: i64,
-    /// When the answer left, by the other's clock \[ns since the epoch\].
+    /// T3: departure of the response, by the other clock \[ns since the epoch\].
     pub answered_ns: i64,
-    /// When the answer came, by this computer's clock \[ns since the epoch\].
+    /// T4: arrival of the response, by this computer's clock \[ns since the epoch\].
     pub back_ns: i64,
 }
 
-/// How far another clock is ahead.
+/// Offset of another clock from this computer's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Offset {
     /// The other clock minus this one \[ns\].
     pub ahead_ns: i64,
-    /// The truth is no farther away from that \[ns\].
+    /// Bound on the error of `ahead_ns` \[ns\].
     pub uncertainty_ns: i64,
 }
 
 impl RoundTrip {
-    /// The offset is θ = ((T2 - T1) + (T3 - T4)) / 2, and the truth within half the time that the way took,
-    /// δ = (T4 - T1) - (T3 - T2), whichever way was the slower one. None where a clock was set meanwhile, and of times
-    /// that nobody can have measured.
+    /// Returns the offset θ = ((T2 - T1) + (T3 - T4)) / 2. Its error is at most half the round-trip delay
+    /// δ = (T4 - T1) - (T3 - T2), however asymmetric the path. `None` for inconsistent timestamps, for example where
+    /// a clock was set during the exchange.
     pub fn offset(&self) -> Option<Offset> {
         let [t1, t2, t3, t4] = [
             self.asked_ns,
@@ -54,7 +55,7 @@ impl RoundTrip {
 }
 
 impl Offset {
-    /// The same some time later: the clocks drift.
+    /// Adds the drift over `age_ms` to the uncertainty.
     fn aged(self, age_ms: u64) -> Self {
         let drift_ns = age_ms as f64 * 1e-3 * DRIFT_NS_PER_S;
         Self {
@@ -63,30 +64,31 @@ impl Offset {
         }
     }
 
-    /// Whether both can be true.
+    /// Whether the two uncertainty intervals overlap.
     fn agrees(self, other: Self) -> bool {
         let apart = self.ahead_ns.abs_diff(other.ahead_ns);
         let most = self.uncertainty_ns.saturating_add(other.uncertainty_ns);
         apart <= most.unsigned_abs()
     }
 
-    /// Whether the clocks differ by more than `limit_ns` for certain.
+    /// Whether the clocks differ by more than `limit_ns` throughout the uncertainty interval.
     pub fn exceeds(self, limit_ns: i64) -> bool {
         let least = self.ahead_ns.saturating_abs();
         least.saturating_sub(self.uncertainty_ns) > limit_ns
     }
 }
 
-/// The newest measurements, of which the surest counts. A slow network makes a measurement uncertain, never wrong.
+/// The latest measurements, of which the one with the smallest uncertainty is used. A slow network increases the
+/// uncertainty of a measurement, but the true offset stays within it.
 #[derive(Debug, Clone, Default)]
 pub struct ClockFilter {
-    /// Each with when it was made \[ms\].
+    /// Offsets with their times of measurement \[ms\].
     kept: VecDeque<(Offset, u64)>,
 }
 
 impl ClockFilter {
-    /// Takes a measurement made at `now_ms` of a clock that only runs. One that cannot be true beside older ones tells
-    /// that a clock was set: those are forgotten.
+    /// Adds a measurement made at `now_ms` of a monotonic clock. Discards older measurements that contradict it,
+    /// because a clock was set since then.
     pub fn note(&mut self, new: Offset, now_ms: u64) {
         self.kept
             .retain(|(old, at_ms)| old.aged(now_ms.saturating_sub(*at_ms)).agrees(new));
@@ -96,19 +98,19 @@ impl ClockFilter {
         self.kept.push_back((new, now_ms));
     }
 
-    /// The surest measurement, with what the clocks may have drifted since.
+    /// Returns the measurement with the smallest uncertainty, including the drift since then.
     pub fn best(&self, now_ms: u64) -> Option<Offset> {
         let aged = self.kept.iter();
         aged.map(|(offset, at_ms)| offset.aged(now_ms.saturating_sub(*at_ms)))
             .min_by_key(|offset| offset.uncertainty_ns)
     }
 
-    /// How many measurements there are.
+    /// Number of measurements.
     pub fn len(&self) -> usize {
         self.kept.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no measurements.
     pub fn is_empty(&self) -> bool {
         self.kept.is_empty()
     }
@@ -120,7 +122,7 @@ mod tests {
 
     const MS: i64 = 1_000_000;
 
-    /// A clock that is `ahead` is asked at 0; the ways there and back, and what lies between them.
+    /// A request sent at 0 to a clock that is `ahead`, with both path delays and the processing time `between` them.
     fn trip(ahead: i64, there: i64, between: i64, back: i64) -> RoundTrip {
         RoundTrip {
             asked_ns: 0,
@@ -161,7 +163,7 @@ mod tests {
         filter.note(trip(MS, MS, 0, MS).offset().unwrap(), 0);
         filter.note(trip(MS, 80 * MS, 0, 0).offset().unwrap(), 1_000);
         assert_eq!(filter.best(1_000).unwrap().ahead_ns, MS);
-        // 15 us a second: after an hour the fast one is as uncertain as one of 55 ms.
+        // 15 us/s of drift: after an hour the first measurement is as uncertain as a new one of 55 ms.
         filter.note(trip(MS, 20 * MS, 0, 0).offset().unwrap(), 3_600_000);
         assert_eq!(filter.best(3_600_000).unwrap().uncertainty_ns, 10 * MS);
     }

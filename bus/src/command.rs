@@ -1,8 +1,9 @@
 //! Commands of people and controllers to a running pipeline.
 //!
-//! A command is asked for as a [`Request`] (JSON). The source of the cell checks it, gives it to the next joint state
-//! as a [`Command`] and answers with that joint state's stamp: from there on it holds. So a command stands in the one
-//! order that all samples have, is archived with its sample, and holds from the same sample in a replay.
+//! A client sends a command as a [`Request`] (JSON). The source of the cell validates it, attaches it to the next
+//! joint state as a [`Command`] and answers with the stamp of that joint state, from which on the command is in
+//! force. Commands are therefore ordered with all other samples and archived with their sample. In a replay they take
+//! effect at the same sample.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,31 +16,31 @@ mod mute;
 pub use ask::{AskError, ask, ask_signed};
 pub use mute::MuteLease;
 
-/// The longest lease of a mute \[s\].
+/// Longest lease of a mute \[s\].
 pub const LONGEST_MUTE_S: f64 = 60.0;
-/// The heaviest payload that is believed \[kg\].
+/// Upper bound on the mass of an accepted payload \[kg\].
 const HEAVIEST_KG: f64 = 10_000.0;
-/// The farthest centre of mass that is believed \[m\].
+/// Upper bound on each coordinate of an accepted centre of mass \[m\].
 const FARTHEST_M: f64 = 100.0;
 
-/// The key expression under which the source of `cell` takes requests.
+/// The key expression on which the source of `cell` accepts requests.
 pub fn key(cell: &str) -> String {
     format!("{cell}/commands")
 }
 
-/// A command as it is asked for.
+/// A command as a client sends it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "verb", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Request {
-    /// Somebody has seen the alarm: a latched collision is released once it has ended.
+    /// Acknowledges the alarm: a latched collision is released once it has ended.
     Acknowledge,
-    /// Alarms raise no stop for so long. The lease ends by itself; 0 ends it at once.
+    /// Mutes alarms: they raise no stop until the lease expires; 0 s ends it at once.
     Mute {
-        /// From the sample that takes the command \[s\].
+        /// Duration, starting at the sample that carries the command \[s\].
         #[schemars(range(min = 0.0, max = LONGEST_MUTE_S))]
         seconds: f64,
     },
-    /// The tool that is attached from now on, as a point mass; 0 kg for none.
+    /// Sets the tool that is attached from now on, as a point mass; 0 kg for none.
     Payload {
         /// Mass \[kg\].
         mass_kg: f64,
@@ -47,29 +48,29 @@ pub enum Request {
         #[serde(default)]
         com_m: [f64; 3],
     },
-    /// Detectors that learn while they run begin to learn anew.
+    /// Restarts the learning of detectors that learn while they run.
     Learn,
-    /// A note in the archive.
+    /// Writes a note to the archive.
     Label {
-        /// At most 48 bytes of UTF-8.
+        /// Text of the note, at most 48 bytes of UTF-8.
         text: String,
     },
 }
 
-/// A [`Request`], and who asks: in JSON the request with one more member, `by`.
+/// A [`Request`] with its requester: in JSON, the request with one more member, `by`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signed {
-    /// What is asked for.
+    /// The request.
     pub request: Request,
-    /// Who asks, where that is known: at most 48 bytes. It is told, not proven.
+    /// Name of the requester, if given: at most 48 bytes. It is not authenticated.
     pub by: Option<String>,
 }
 
 impl Signed {
-    /// The request in `json`, with or without a name.
+    /// Parses a request with or without a requester.
     ///
     /// # Errors
-    /// If it is none.
+    /// If `json` is not a valid request.
     pub fn from_json(json: &[u8]) -> Result<Self, Refusal> {
         let none = |error: serde_json::Error| Refusal::NotARequest(error.to_string());
         let mut value: serde_json::Value = serde_json::from_slice(json).map_err(none)?;
@@ -86,10 +87,10 @@ impl Signed {
         })
     }
 
-    /// As JSON.
+    /// Serialises to JSON.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the serialisation fails.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         let mut value = serde_json::to_value(&self.request)?;
         if let (Some(members), Some(by)) = (value.as_object_mut(), &self.by) {
@@ -98,10 +99,10 @@ impl Signed {
         serde_json::to_string(&value)
     }
 
-    /// The command that it asks for; who asks is its text, but for a label, which is one.
+    /// Returns the requested command. Its text is the requester, or for a label the note.
     ///
     /// # Errors
-    /// If it asks for something that cannot be.
+    /// If an argument or the name of the requester is invalid.
     pub fn command(&self) -> Result<Command, Refusal> {
         let mut command = self.request.command()?;
         let by = self.by.as_deref();
@@ -115,61 +116,61 @@ impl Signed {
     }
 }
 
-/// What a source says to a [`Request`].
+/// The answer of a source to a [`Request`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "answer", rename_all = "snake_case")]
 pub enum Answer {
-    /// It holds.
+    /// Command accepted.
     Taken {
-        /// Stamp of the first sample for which it holds \[ns since the epoch\].
+        /// Stamp of the first sample for which the command is in force \[ns since the epoch\].
         stamp_ns: i64,
     },
-    /// It does not, and nothing has changed.
+    /// Command rejected; nothing has changed.
     Refused {
-        /// Why, and what to do.
+        /// Reason, and what to do.
         reason: String,
     },
 }
 
-/// Why a request is refused.
+/// Reason for the rejection of a request.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Refusal {
-    /// Not a request.
+    /// Malformed request.
     #[error("this is no command: {0}")]
     NotARequest(String),
-    /// A lease that is none, or too long.
+    /// Mute duration out of range \[s\].
     #[error("a mute lasts 0 to {LONGEST_MUTE_S} s, not {0} s; ask again when it has ended")]
     Lease(f64),
-    /// A mass that no arm carries.
+    /// Payload mass out of range \[kg\].
     #[error("a payload has a mass of 0 to {HEAVIEST_KG} kg, not {0} kg")]
     Mass(f64),
-    /// A centre of mass that is nowhere near.
+    /// Centre of mass too far from the tool link.
     #[error("a centre of mass is within {FARTHEST_M} m of the tool link")]
     CentreOfMass,
-    /// A label without text, or with too much of it.
+    /// Label that is empty, too long or has control characters.
     #[error("a label has 1 to {limit} bytes of text, no line breaks, not these {found}", limit = Name::CAPACITY)]
     Label {
-        /// How many bytes it has.
+        /// Length \[bytes\].
         found: usize,
     },
-    /// A name of who asks that is none.
-    #[error("who asks is named in 1 to {limit} bytes of text, no line breaks, not these {found}", limit = Name::CAPACITY)]
+    /// Name of the requester that is empty, too long or has control characters.
+    #[error("the name of a requester has 1 to {limit} bytes, no line breaks, not these {found}", limit = Name::CAPACITY)]
     Name {
-        /// How many bytes it has.
+        /// Length \[bytes\].
         found: usize,
     },
 }
 
 impl Request {
-    /// The command of this verb with these arguments, as [`Command::arguments`] wrote them.
+    /// Parses an archived command from its verb and its arguments, as written by [`Command::arguments`].
     ///
     /// # Errors
-    /// If there is no such verb, or an argument is missing or wrong.
+    /// If the verb is unknown, or an argument is missing or invalid.
     pub fn archived<'a>(
         verb: &str,
         argument: impl Fn(&str) -> Option<&'a str>,
     ) -> Result<Command, Refusal> {
-        let wrong = |name: &str| Refusal::NotARequest(format!("`{verb}` has no sound `{name}`"));
+        let wrong = |name: &str| Refusal::NotARequest(format!("`{verb}` has no valid `{name}`"));
         let number = |name: &str| {
             let value = argument(name).and_then(|text| text.parse().ok());
             value.ok_or_else(|| wrong(name))
@@ -198,18 +199,18 @@ impl Request {
         Signed { request, by }.command()
     }
 
-    /// The request in `json`.
+    /// Parses a request.
     ///
     /// # Errors
-    /// If it is none.
+    /// If `json` is not a valid request.
     pub fn from_json(json: &[u8]) -> Result<Self, Refusal> {
         serde_json::from_slice(json).map_err(|error| Refusal::NotARequest(error.to_string()))
     }
 
-    /// The command that it asks for.
+    /// Validates the request and returns its command.
     ///
     /// # Errors
-    /// If it asks for something that cannot be.
+    /// If an argument is invalid.
     pub fn command(&self) -> Result<Command, Refusal> {
         Ok(match self {
             Self::Acknowledge => Command::of(Verb::Acknowledge),
@@ -321,7 +322,7 @@ mod tests {
         };
         assert_eq!(Request::archived("mute", find), Ok(command));
         for (json, reason) in [
-            (r#"{"verb": "learn", "by": ""}"#, "who asks is named in"),
+            (r#"{"verb": "learn", "by": ""}"#, "the name of a requester"),
             (r#"{"verb": "learn", "by": 3}"#, "`by`"),
         ] {
             let refusal = Signed::from_json(json.as_bytes()).and_then(|signed| signed.command());

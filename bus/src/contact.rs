@@ -1,7 +1,7 @@
 //! Summary of a contact, from its first sample to its last.
 //!
-//! At the onset little of the force is there yet, and the link is a guess. Terminal, archive, picture and replay report
-//! this summary, so that all of them agree.
+//! At the onset the force has hardly built up, and the link is uncertain. Terminal, archive, picture and replay all
+//! report this summary, so that they agree.
 
 use std::fmt;
 
@@ -9,53 +9,53 @@ use crate::sample::{Detection, EventKind, Name, flags};
 
 /// A contact, or a change of the arm, as a detector reports it.
 ///
-/// Link and joints are the newest estimate, because a detector estimates them from the whole contact so far. The kind is
-/// that of the sample with the largest score. The force is that of the sample with the largest score among those that
-/// name the link: the largest of many estimates of a force would be too large.
+/// Link and joints are the newest estimate, because a detector estimates them from the whole contact so far. The kind
+/// is that of the sample with the largest score. The force is that of the sample with the largest score among those
+/// that name the link: the largest of many force estimates would be biased high.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
-    /// Its kind: the detector's state, e.g. `contact`, `collision`.
+    /// Kind: the detector's state, e.g. `contact`, `collision`.
     pub kind: Name,
     /// The touched link; empty where not estimated.
     pub link: Name,
-    /// A second link that fits nearly as well; empty where the first is certain.
+    /// A second link that fits nearly as well; empty where the first is unambiguous.
     pub other_link: Name,
-    /// The joints that carry torque from it: bit j for joint j.
+    /// Joints that carry torque from the contact: bit j for joint j.
     pub joints: u32,
-    /// Estimated beginning \[ns since the epoch\].
+    /// Estimated start \[ns since the epoch\].
     pub contact_ns: i64,
     /// Stamp of the sample that raised the alarm \[ns since the epoch\].
     pub onset_ns: i64,
-    /// Stamp of the sample that ended it, or of the newest while it lasts \[ns since the epoch\].
+    /// Stamp of the sample that ended the contact, or of the newest while it lasts \[ns since the epoch\].
     pub end_ns: i64,
-    /// The newest sample whose score reached the threshold, if one did \[ns since the epoch\].
+    /// Stamp of the newest sample whose score reached the threshold, if any \[ns since the epoch\].
     last_high_ns: Option<i64>,
-    /// The largest score.
+    /// Largest score.
     pub peak_score: f64,
-    /// The largest score of the samples that name the link.
+    /// Largest score of the samples that name the link.
     link_score: f64,
-    /// Size of a change of the arm ([`flags::CHANGE`]), as it was told at its onset.
+    /// Size of a change of the arm ([`flags::CHANGE`]), as reported at its onset.
     pub size: Option<f64>,
-    /// At `link_score`, as far as a force was estimated.
+    /// Force at the sample with `link_score`, if estimated.
     force: Option<Force>,
 }
 
 /// A force on the robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Force {
-    /// World frame \[N\].
+    /// Force vector, world frame \[N\].
     pub force_n: [f64; 3],
-    /// Where it is taken to act, world frame \[m\].
+    /// Assumed point of application, world frame \[m\].
     pub point_m: [f64; 3],
 }
 
 impl Force {
-    /// How strong it is \[N\].
+    /// Magnitude \[N\].
     pub fn norm_n(&self) -> f64 {
         self.force_n.iter().map(|f| f * f).sum::<f64>().sqrt()
     }
 
-    /// Unit vector, world frame; zeros for no force.
+    /// Unit vector of the force, world frame; zero for a zero force.
     pub fn direction(&self) -> [f64; 3] {
         let norm_n = self.norm_n();
         self.force_n
@@ -116,13 +116,13 @@ impl Contact {
         }
     }
 
-    /// The force where the contact is strongest, if one was estimated.
+    /// The force at the largest score, if one was estimated.
     pub fn peak(&self) -> Option<&Force> {
         self.force.as_ref()
     }
 
-    /// From the sample that raised the alarm to the last one whose score reached the threshold \[s\]. Both come late by
-    /// about as much; the estimated beginning is less exact, and the alarm is held for a while.
+    /// Duration from the sample that raised the alarm to the last one whose score reached the threshold \[s\]. Both
+    /// have about the same delay; the estimated start is less exact, and the alarm is held beyond the contact.
     pub fn duration_s(&self) -> f64 {
         let last_ns = self.last_high_ns.unwrap_or(self.end_ns);
         last_ns.saturating_sub(self.onset_ns).max(0) as f64 * 1e-9
@@ -130,7 +130,7 @@ impl Contact {
 }
 
 impl Contact {
-    /// How long it lasted: `0.84 s`, or `one sample` where the score reached the threshold only once.
+    /// Duration in words: `0.84 s`, or `one sample` if the score reached the threshold only once.
     pub fn duration_in_words(&self) -> String {
         match self.duration_s() {
             0.0 => "one sample".to_owned(),
@@ -140,7 +140,7 @@ impl Contact {
     }
 }
 
-/// Where and how hard, in the words that every output has: `24 N at link5`, `24 N at link3 or link4`.
+/// Force and place in the wording of every output: `24 N at link5`, `24 N at link3 or link4`.
 impl fmt::Display for Contact {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.peak(), self.link.as_str()) {
@@ -152,14 +152,14 @@ impl fmt::Display for Contact {
     }
 }
 
-/// One link, or two of which either may be meant.
+/// One link, or two candidates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Links {
     link: Name,
     other_link: Name,
 }
 
-/// `link3`, `link3 or link4`.
+/// `link3` or `link3 or link4`.
 impl fmt::Display for Links {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.other_link.as_str() {
@@ -170,7 +170,7 @@ impl fmt::Display for Links {
 }
 
 impl Contact {
-    /// The links that it may have been at, in words.
+    /// The candidate links, in words.
     pub fn links(&self) -> Links {
         let (link, other_link) = (self.link, self.other_link);
         Links { link, other_link }
@@ -178,22 +178,22 @@ impl Contact {
 }
 
 impl Detection {
-    /// The links that the contact may be at, in words; empty where not estimated.
+    /// The candidate links of the contact, in words; empty where not estimated.
     pub fn links(&self) -> Links {
         let (link, other_link) = (self.link, self.other_link);
         Links { link, other_link }
     }
 }
 
-/// Follows a detector's contacts. Holds one contact and allocates nothing.
+/// Tracks a detector's contacts. Holds one contact and does not allocate.
 #[derive(Debug, Clone, Default)]
 pub struct ContactFollower {
     open: Option<Contact>,
 }
 
 impl ContactFollower {
-    /// Takes the next sample. Gives the contact that ends there, if one does: at its offset, or where the next one
-    /// begins at once.
+    /// Processes the next sample. Returns the contact that ends with it, at its offset or at the onset of the next
+    /// contact.
     pub fn push(&mut self, detection: &Detection) -> Option<Contact> {
         let stamp_ns = detection.header.stamp_ns;
         let end = |mut contact: Contact| {
@@ -211,7 +211,7 @@ impl ContactFollower {
         }
     }
 
-    /// The contact that lasts, as far as it is known by now.
+    /// The contact in progress, as estimated so far.
     pub fn open(&self) -> Option<&Contact> {
         self.open.as_ref()
     }
@@ -243,11 +243,11 @@ mod tests {
         assert!(contacts.push(&Detection::default()).is_none());
         contacts.push(&sample(10, Detection::ONSET, 9.0, "link2", 4.0));
         assert_eq!(contacts.open().unwrap().to_string(), "4 N at link2");
-        // A wild guess at another link is none of the peak.
+        // An outlier at another link must not become the peak.
         contacts.push(&sample(20, 0, 20.0, "link1", 300.0));
         contacts.push(&sample(30, 0, 80.0, "link5", 24.0));
         contacts.push(&sample(40, 0, 70.0, "link5", 25.0));
-        // It swings back.
+        // The arm rebounds.
         contacts.push(&sample(45, 0, 12.0, "link5", -60.0));
         let end = sample(50, Detection::OFFSET, 1.0, "", 0.0);
         let ended = contacts.push(&end).unwrap();
@@ -273,7 +273,7 @@ mod tests {
         let words = |contacts: &ContactFollower| contacts.open().unwrap().to_string();
         assert_eq!(words(&contacts), "24 N at link3 or link4");
         assert_eq!(unsure.links().to_string(), "link3 or link4");
-        // Later it is sure, and the force is larger.
+        // Later the link is unambiguous and the force larger.
         contacts.push(&sample(30, 0, 90.0, "link3", 25.0));
         assert_eq!(words(&contacts), "25 N at link3");
     }

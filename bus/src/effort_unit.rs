@@ -17,10 +17,10 @@ pub enum EffortUnit {
 }
 
 impl EffortUnit {
-    /// All of them.
+    /// All units.
     pub const ALL: [Self; 2] = [Self::Nm, Self::A];
 
-    /// As it is written in files.
+    /// Name of the unit in files.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Nm => "Nm",

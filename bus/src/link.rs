@@ -1,9 +1,12 @@
-//! Links: how a stream gets from the stage that makes it to those that listen.
+//! Links: the transport of a stream from the stage that emits it to its receivers.
 //!
-//! Every implementation keeps the same promises, which one conformance suite checks: order is kept;
-//! a hole in the sequence is counted as lost by the receiver; a receiver that comes late hears what
-//! is sent from then on; a slow receiver loses the oldest under [`Keep::Newest`] and makes the sender
-//! wait under [`Keep::All`]; a peer that is gone and back is heard again; the end of a stream is told.
+//! Every implementation gives the same guarantees, which one conformance suite checks:
+//!
+//! - Samples arrive in order, and the receiver counts a gap in the sequence as lost.
+//! - A receiver that connects late gets all samples sent from then on.
+//! - A slow receiver loses the oldest samples under [`Keep::Newest`] and blocks the sender under [`Keep::All`].
+//! - After a restart of either peer the stream continues.
+//! - The end of the stream is delivered to every receiver.
 
 use std::time::Duration;
 
@@ -30,38 +33,37 @@ pub use spill::{Spill, SpillSettings};
 pub use wake::Wake;
 pub use zenoh::{Zenoh, ZenohEndpoints, ZenohRouter, zenoh_reason};
 
-/// How long a sender waits for one keep-all receiver that takes nothing, before it counts the
-/// sample as undelivered and goes on. A receiver that has used this up is not waited for again until
-/// it has taken something.
+/// Stall timeout: longest wait for a keep-all receiver that takes nothing. Then the sample counts as undelivered, and
+/// the sender does not wait for this receiver again until it has taken a sample.
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Most samples that a keep-all receiver may leave unread.
+/// Largest number of unread samples of a receiver.
 /// Resolution: memory.
 pub const MAX_DEPTH: usize = 1024;
 
-/// What becomes of a sample that a receiver has no room for.
+/// Overflow policy of a receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Keep {
-    /// The sender waits: nothing is lost.
+    /// The sender waits; nothing is lost.
     #[default]
     All,
-    /// The oldest unread sample gives way, and is counted as lost.
+    /// The oldest unread sample is discarded and counted as lost.
     Newest,
 }
 
-/// How many receivers of each kind a sender expects.
+/// Number of receivers that a sender expects, by overflow policy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Audience {
-    /// Receivers that keep all.
+    /// Receivers with [`Keep::All`].
     pub keep_all: usize,
-    /// Receivers that keep the newest.
+    /// Receivers with [`Keep::Newest`].
     pub keep_newest: usize,
 }
 
 impl Audience {
-    /// `count` receivers of one kind.
+    /// `count` receivers with one policy.
     pub fn of(keep: Keep, count: usize) -> Self {
         match keep {
             Keep::All => Self {
@@ -75,7 +77,7 @@ impl Audience {
         }
     }
 
-    /// How many expect this policy.
+    /// Number of receivers with this policy.
     pub fn count(&self, keep: Keep) -> usize {
         match keep {
             Keep::All => self.keep_all,
@@ -84,119 +86,119 @@ impl Audience {
     }
 }
 
-/// How far a receiver has come in a stream.
+/// Position of a receiver in a stream.
 ///
-/// A sender that starts anew counts from 0 again under another `instance`, so that its restart is
-/// neither taken for a giant gap nor hides one.
+/// A sender that restarts counts from 0 again under another `instance`, so that a restart neither looks like a large
+/// gap nor hides one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Position {
-    /// Which life of the sender.
+    /// Session epoch of the sender.
     pub instance: u64,
-    /// The sequence number expected next.
+    /// Sequence number expected next.
     pub next: u64,
 }
 
-/// Why a link cannot do what was asked.
+/// Failure of a link.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// It could not be opened.
+    /// Link that could not be opened.
     #[error("cannot open the link for stream `{stream}` over {transport}: {reason}")]
     Open {
-        /// The stream.
+        /// Name of the stream.
         stream: String,
         /// `in process`, `iceoryx2` or `zenoh`.
         transport: &'static str,
-        /// What the transport says.
+        /// Error message of the transport.
         reason: String,
     },
-    /// There is no session with those that are reached over a network.
+    /// Zenoh session that could not be opened.
     #[error("cannot open a Zenoh session at {at}: {reason}")]
     Session {
-        /// Where it listens and connects.
+        /// Endpoints to listen on and to connect to.
         at: String,
-        /// Why, and what to do.
+        /// Cause, and what to do.
         reason: String,
     },
-    /// A sample could not be sent.
+    /// Sample that could not be sent.
     #[error("cannot send on stream `{stream}`: {reason}")]
     Send {
-        /// The stream.
+        /// Name of the stream.
         stream: String,
-        /// What the transport says.
+        /// Error message of the transport.
         reason: String,
     },
-    /// Receiving failed.
+    /// Failure of the transport while receiving.
     #[error("cannot receive from stream `{stream}`: {reason}")]
     Receive {
-        /// The stream.
+        /// Name of the stream.
         stream: String,
-        /// What the transport says.
+        /// Error message of the transport.
         reason: String,
     },
-    /// The other side speaks another version of the sample type.
+    /// Peer with another type, or another version of the sample type.
     #[error("stream `{stream}` carries {found}, expected {expected}")]
     TypeMismatch {
-        /// The stream.
+        /// Name of the stream.
         stream: String,
-        /// The type that was expected.
+        /// Expected type.
         expected: String,
-        /// The type that came.
+        /// Type of the peer.
         found: String,
     },
 }
 
-/// What a sending end has counted.
+/// Counters of a sending end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct SenderCounts {
     /// Samples sent.
     pub sent: u64,
-    /// Samples that an expected keep-all receiver did not get, once per such receiver: it was not
-    /// there, or it took nothing within the sender's patience.
+    /// Samples that an expected keep-all receiver did not get, once per such receiver: it was not connected, or it
+    /// took nothing within the stall timeout.
     pub undelivered: u64,
 }
 
-/// What a receiving end has counted.
+/// Counters of a receiving end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ReceiverCounts {
     /// Samples received.
     pub received: u64,
-    /// Samples known to be lost: holes in the sequence.
+    /// Samples known to be lost: gaps in the sequence.
     pub lost: u64,
-    /// Samples that no stage may see ([`Sample::check`]).
+    /// Invalid samples, which no stage gets ([`Sample::check`]).
     #[serde(default)]
     pub refused: u64,
-    /// Samples sent before this end came in.
+    /// Samples sent before this end connected.
     #[serde(default)]
     pub before: u64,
-    /// Messages of somebody who is not the stream's sender, or that are no samples of it: not part of the books.
+    /// Messages that are not samples of this stream or not from its sender; not part of the balance of samples.
     #[serde(default)]
     pub foreign: u64,
-    /// Lives of the sender that ended without an end of the stream, and of which no later life knows: nobody knows how
-    /// many samples they had sent.
+    /// Sessions of the sender that ended without an end of the stream and without a successor that accounts for them;
+    /// the number of samples that they sent is unknown.
     #[serde(default)]
     pub broken_off: u64,
 }
 
 impl ReceiverCounts {
-    /// Samples of the stream that did not get through; the stream has these and those received.
+    /// Samples of the stream that were not received; with `received`, these are all samples of the stream.
     pub fn dropped(&self) -> u64 {
         let lost = self.lost.saturating_add(self.refused);
         lost.saturating_add(self.before)
     }
 }
 
-/// What a receiving end got.
+/// Result of [`Receiver::receive`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Received {
-    /// A sample, which was handed to the reader in place.
+    /// A sample, passed to the reader in place.
     Sample,
-    /// Nothing within the time.
+    /// No sample within the timeout.
     Nothing,
-    /// The stream has ended in order. What a sender that starts anew sends is heard again.
+    /// Normal end of the stream. Samples of a restarted sender are received again.
     End,
 }
 
-/// One way of carrying streams.
+/// A transport of streams.
 pub trait Transport {
     /// Opens the sending end of `stream`. A stream has one sender at a time.
     ///
@@ -209,11 +211,10 @@ pub trait Transport {
         audience: Audience,
     ) -> Result<Box<dyn Sender<T>>, LinkError>;
 
-    /// Opens a receiving end of `stream` that leaves at most `depth` samples unread (1 to
-    /// [`MAX_DEPTH`]; what is outside is brought inside).
+    /// Opens a receiving end of `stream` that leaves at most `depth` samples unread (clamped to 1 to [`MAX_DEPTH`]).
     ///
     /// # Errors
-    /// As [`Transport::sender`].
+    /// See [`Transport::sender`].
     fn receiver<T: Sample>(
         &self,
         stream: &str,
@@ -222,44 +223,43 @@ pub trait Transport {
     ) -> Result<Box<dyn Receiver<T>>, LinkError>;
 }
 
-/// The end of a link at the stage that makes a stream.
+/// Sending end of a link, at the stage that emits the stream.
 pub trait Sender<T: Sample>: Send {
     /// Loans a slot (a default `T`), lets `write` fill it in place, numbers it and sends it.
     ///
     /// # Errors
-    /// [`LinkError::Send`] if the transport fails; a slow receiver is no error.
+    /// [`LinkError::Send`] if the transport fails; a slow receiver is not an error.
     fn send_with(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError>;
 
-    /// So many samples are lost before they could be sent: the receivers find a hole in the sequence.
+    /// Advances the sequence by `count` samples lost before they could be sent; the receivers find a gap.
     fn skip(&mut self, count: u64);
 
-    /// Tells every receiver that the stream has ended.
+    /// Sends the end of the stream to every receiver.
     ///
     /// # Errors
-    /// As [`Sender::send_with`].
+    /// See [`Sender::send_with`].
     fn end(&mut self) -> Result<(), LinkError>;
 
-    /// Waits until the expected receivers are connected and returns how many are missing.
+    /// Waits until the expected receivers are connected and returns the number of missing ones.
     ///
     /// # Errors
     /// [`LinkError::Send`] if the transport fails.
     fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError>;
 
-    /// After [`Sender::end`]: waits until every receiver that was told has taken the end (and with
-    /// it all that came before), and returns how many have not. A process that exits earlier may
-    /// take unread samples with it.
+    /// Waits, after [`Sender::end`], until every connected receiver has taken the end and so all samples before it.
+    /// Returns the number of receivers that have not. A process that exits earlier may lose unread samples.
     ///
     /// # Errors
-    /// As [`Sender::send_with`].
+    /// See [`Sender::send_with`].
     fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError>;
 
-    /// What it has counted.
+    /// The counters.
     fn counts(&self) -> SenderCounts;
 }
 
-/// The end of a link at a stage that listens.
+/// Receiving end of a link, at a stage that accepts the stream.
 pub trait Receiver<T: Sample>: Send {
-    /// Waits at most `timeout` for the next sample and hands it to `read` where it lies.
+    /// Waits at most `timeout` for the next sample and passes it to `read` in place.
     ///
     /// # Errors
     /// [`LinkError::Receive`] or [`LinkError::TypeMismatch`].
@@ -269,14 +269,14 @@ pub trait Receiver<T: Sample>: Send {
         read: &mut dyn FnMut(&T),
     ) -> Result<Received, LinkError>;
 
-    /// What it has counted.
+    /// The counters.
     fn counts(&self) -> ReceiverCounts;
 
-    /// How far it has come; `None` if it has heard nothing yet.
+    /// Position in the stream; `None` before the first message.
     fn position(&self) -> Option<Position>;
 
-    /// Goes on where an earlier life of this receiver was: what was sent since then and is not heard
-    /// any more counts as lost.
+    /// Resumes at the position of an earlier incarnation of this receiver. Samples sent since then that no longer
+    /// arrive count as lost.
     fn resume(&mut self, position: Position);
 }
 

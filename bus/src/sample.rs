@@ -1,7 +1,7 @@
-//! Samples: what travels on the bus. Each is fixed in size and `#[repr(C)]`, so that it can be
-//! written straight into shared memory and read there.
+//! Samples: the data types on the bus. Each has a fixed size and is `#[repr(C)]`, so that it can be written directly
+//! into shared memory and read there.
 //!
-//! Joints stand in the order of the robot's URDF, which every stage of a cell knows; entries from
+//! Joints are in the order of the robot's URDF, which every stage of a cell knows; entries from
 //! [`Header::joint_count`] on are zero. Angles are rad (or m for a prismatic joint), velocities
 //! rad/s, efforts N m (N) or A, as the cell declares.
 
@@ -19,7 +19,7 @@ use check::Values as _;
 pub use command::{Command, Verb};
 pub use name::Name;
 
-/// The most joints one cell may have. Fixed, because a sample's size is.
+/// Largest number of joints of a cell. Fixed, because the size of a sample is.
 /// Resolution: size of a sample; arms have 6 or 7 joints, two arms 14.
 pub const MAX_JOINTS: usize = 16;
 
@@ -28,39 +28,39 @@ pub type JointArray = [f64; MAX_JOINTS];
 
 /// Bits of [`Header::flags`].
 pub mod flags {
-    /// The stream ends here; the rest of the sample is void.
+    /// End of the stream; the rest of the sample is void.
     pub const END: u32 = 1;
-    /// The source gave a velocity (else it was differentiated).
+    /// Velocity measured by the source (otherwise differentiated).
     pub const VELOCITY_MEASURED: u32 = 1 << 1;
-    /// The source gave an effort (else it is zero).
+    /// Effort measured by the source (otherwise zero).
     pub const EFFORT_MEASURED: u32 = 1 << 2;
-    /// `command_*` hold a commanded motion.
+    /// Commanded motion in `command_*`.
     pub const COMMAND: u32 = 1 << 3;
-    /// `reference_effort` holds somebody else's twin.
+    /// Effort of an external twin in `reference_effort`.
     pub const REFERENCE: u32 = 1 << 4;
-    /// `tool_*` hold a tool that is attached now.
+    /// Attached tool in `tool_*`.
     pub const TOOL: u32 = 1 << 5;
-    /// Filters have settled: the derived numbers can be trusted.
+    /// Filters have settled: the derived values are valid.
     pub const READY: u32 = 1 << 6;
-    /// The clock jumped or a gap in the data was longer than filters bridge; state was reset here.
+    /// State reset at this sample, because the clock jumped or a gap was too long for the filters to bridge.
     pub const RESET: u32 = 1 << 7;
-    /// `force_n` and `link` of a detection hold an estimate.
+    /// Estimates in `force_n` and `link` of a detection.
     pub const FORCE: u32 = 1 << 8;
-    /// The commanded velocity is given (else it was differentiated from the position).
+    /// Commanded velocity given by the source (otherwise differentiated from the position).
     pub const COMMAND_VELOCITY: u32 = 1 << 9;
-    /// A detector sees a contact, or a change of the arm, now.
+    /// Alarm: a contact, or a change of the arm.
     pub const ALARM: u32 = 1 << 10;
-    /// What a detection tells of is no contact but a change of the arm, of the size in `size`.
+    /// The detection is a change of the arm, not a contact; its size is in `size`.
     pub const CHANGE: u32 = 1 << 11;
-    /// Somebody asks the detectors to learn the robot's usual behaviour anew, from this sample on.
+    /// Request to the detectors to relearn the robot's baseline behaviour from this sample on.
     pub const LEARN: u32 = 1 << 12;
-    /// `content_n` of a detection holds the force's frequency content.
+    /// Frequency content of the force in `content_n` of a detection.
     pub const CONTENT: u32 = 1 << 13;
-    /// `rise_direction` and `motion_direction` of a detection hold unit vectors.
+    /// Unit vectors in `rise_direction` and `motion_direction` of a detection.
     pub const DIRECTIONS: u32 = 1 << 14;
 }
 
-/// What every sample begins with.
+/// Header of every sample.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable, ZeroCopySend)]
 pub struct Header {
@@ -68,11 +68,11 @@ pub struct Header {
     pub stamp_ns: i64,
     /// Time of reception at the source \[ns since the epoch\]; the archive's log time.
     pub received_ns: i64,
-    /// Number of the sample in its stream, from 0; a hole means loss. Set by the sending link.
+    /// Sequence number in the stream, from 0; a gap means loss. Set by the sending link.
     pub sequence: u64,
     /// Bits of [`flags`].
     pub flags: u32,
-    /// How many entries of a [`JointArray`] are meant.
+    /// Number of valid entries of a [`JointArray`].
     pub joint_count: u32,
 }
 
@@ -83,7 +83,7 @@ impl Header {
     }
 }
 
-/// What a robot says of itself at one instant, and what belongs to that instant.
+/// Measurements of a robot at one instant, with the commands and the tool at that instant.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable, ZeroCopySend)]
 #[type_name("tauscope/JointState/2")]
@@ -98,21 +98,21 @@ pub struct JointState {
     pub effort: JointArray,
     /// Newest commanded position at or before the stamp \[rad\]; see [`flags::COMMAND`].
     pub command_position: JointArray,
-    /// Its velocity \[rad/s\].
+    /// Velocity of the commanded motion \[rad/s\].
     pub command_velocity: JointArray,
-    /// Newest effort at or before the stamp that another twin computed; see [`flags::REFERENCE`].
+    /// Newest effort at or before the stamp from an external twin; see [`flags::REFERENCE`].
     pub reference_effort: JointArray,
     /// Mass of the attached tool \[kg\]; see [`flags::TOOL`].
     pub tool_mass_kg: f64,
-    /// Its centre of mass in the tool link's frame \[m\].
+    /// Centre of mass of the tool in the tool link's frame \[m\].
     pub tool_com_m: [f64; 3],
-    /// Its inertia about that centre, tool axes: xx, xy, xz, yy, yz, zz \[kg m²\].
+    /// Inertia of the tool about its centre of mass, tool axes: xx, xy, xz, yy, yz, zz \[kg m²\].
     pub tool_inertia_kgm2: [f64; 6],
-    /// What somebody told the pipeline, from this sample on; all zeros for nothing.
+    /// Command to the pipeline, in force from this sample on; all zeros for none.
     pub command: Command,
 }
 
-/// What the twin made of a [`JointState`].
+/// State of the twin for a [`JointState`].
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable, ZeroCopySend)]
 #[type_name("tauscope/TwinState/1")]
@@ -138,10 +138,10 @@ pub struct TwinState {
     pub residual: JointArray,
 }
 
-/// What a detector said of one sample, beyond its score.
+/// Change of a detector's alarm at one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EventKind {
-    /// Nothing began or ended here.
+    /// No change.
     None,
     /// The alarm was raised at this sample.
     Onset,
@@ -149,7 +149,7 @@ pub enum EventKind {
     Offset,
 }
 
-/// A detector's verdict on one sample. One goes out for every sample that came in.
+/// Result of a detector for one sample. It emits one for every sample that it accepts.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable, ZeroCopySend)]
 #[type_name("tauscope/Detection/4")]
@@ -158,39 +158,39 @@ pub struct Detection {
     pub header: Header,
     /// The detector's canonical name, e.g. `twin_regression`.
     pub detector: Name,
-    /// What it says now in its own words: `not_ready`, `free`, `contact`, `collision`, `cooperation`, …;
-    /// of a change of the arm ([`flags::CHANGE`]) the effect's canonical name, or `unknown`.
+    /// State of the detector: `not_ready`, `free`, `contact`, `collision`, `cooperation`, …;
+    /// for a change of the arm ([`flags::CHANGE`]) the effect's canonical name, or `unknown`.
     pub state: Name,
     /// The touched or changed link, estimated from the whole contact so far; empty where not estimated.
     pub link: Name,
-    /// A second link that fits nearly as well; empty where the first is certain, or none is estimated.
+    /// A second link that fits nearly as well; empty where the first is unambiguous, or none is estimated.
     pub other_link: Name,
-    /// The score; its unit is the detector's.
+    /// Score, in the unit of the detector.
     pub score: f64,
-    /// The score from which on it raises an alarm.
+    /// Alarm threshold of the score.
     pub threshold: f64,
-    /// Estimated beginning of the contact or change \[ns since the epoch\], while an alarm lasts
+    /// Estimated start of the contact or change \[ns since the epoch\], while an alarm lasts
     /// ([`flags::ALARM`]).
     pub contact_ns: i64,
     /// Estimated force on the robot, world frame \[N\]; see [`flags::FORCE`].
     pub force_n: [f64; 3],
-    /// Where the force is taken to act, world frame \[m\].
+    /// Assumed point of application of the force, world frame \[m\].
     pub point_m: [f64; 3],
-    /// The joints that carry torque from the whole contact so far: bit j for joint j in URDF order.
+    /// Joints that carry torque from the whole contact so far: bit j for joint j in URDF order.
     pub joints: u32,
-    /// 0 nothing, 1 the alarm begins, 2 it ends at this sample; read it with [`Detection::event`].
+    /// 0 no change, 1 onset, 2 offset of the alarm at this sample; read it with [`Detection::event`].
     pub event: u32,
-    /// Size of a change ([`flags::CHANGE`]): \[kg\] for `payload`, a factor for `torque_gain`, else in the
+    /// Size of a change ([`flags::CHANGE`]): \[kg\] for `payload`, a factor for `torque_gain`, otherwise in the
     /// unit of the effect's parameter \[effort unit, or that per rad/s\]; 0 for `unknown`.
     pub size: f64,
-    /// By direction of the world frame, how much of the external force lies in the band that the detector
-    /// watches \[N\]; see [`flags::CONTENT`].
+    /// Magnitude of the external force within the detector's frequency band, by axis of the world frame \[N\];
+    /// see [`flags::CONTENT`].
     pub content_n: [f64; 3],
-    /// Unit vector of the external force's change as the contact was detected, world frame; zeros for a force
+    /// Unit vector of the external force's change at the detection of the contact, world frame; zeros for a force
     /// that did not change. See [`flags::DIRECTIONS`].
     pub rise_direction: [f64; 3],
-    /// Unit vector of the tool's velocity as the contact began, world frame; zeros for a tool that stood
-    /// still. See [`flags::DIRECTIONS`].
+    /// Unit vector of the tool's velocity at the start of the contact, world frame; zeros for a tool at rest.
+    /// See [`flags::DIRECTIONS`].
     pub motion_direction: [f64; 3],
 }
 
@@ -200,7 +200,7 @@ impl Detection {
     /// Value of `event` at the sample that ends it.
     pub const OFFSET: u32 = 2;
 
-    /// What begins or ends here.
+    /// Change of the alarm at this sample.
     pub fn event(&self) -> EventKind {
         match self.event {
             Self::ONSET => EventKind::Onset,
@@ -209,32 +209,32 @@ impl Detection {
         }
     }
 
-    /// Whether the detector sees a contact now.
+    /// Whether the alarm is raised.
     pub fn alarm(&self) -> bool {
         self.header.has(flags::ALARM)
     }
 }
 
-/// How a stage fares; one a second of stream time and one at the end.
+/// Health report of a stage, sent once per second of stream time and at the end.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable, ZeroCopySend)]
 #[type_name("tauscope/Health/1")]
 pub struct Health {
     /// Stamp of the stage's newest sample; sequence of this report.
     pub header: Header,
-    /// The stage.
+    /// Name of the stage.
     pub stage: Name,
-    /// Samples that came in.
+    /// Samples received.
     pub received: u64,
-    /// Samples that went out.
+    /// Samples emitted.
     pub emitted: u64,
-    /// Samples lost before or in the stage: holes in the inputs and samples it had to refuse.
+    /// Samples lost before or in the stage: gaps in the inputs, and refused samples.
     pub dropped: u64,
-    /// How often the supervisor started it again.
+    /// Number of restarts by the supervisor.
     pub restarts: u64,
 }
 
-/// Which of the sample types a stream carries; in JSON `joint_state`, `twin_state` and so on.
+/// Sample type of a stream; in JSON `joint_state`, `twin_state` and so on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SampleKind {
@@ -249,7 +249,7 @@ pub enum SampleKind {
 }
 
 impl SampleKind {
-    /// The type's name on the bus, the same in every process and language.
+    /// Name of the type on the bus, equal in every process and language.
     pub fn type_name(self) -> &'static str {
         match self {
             Self::JointState => "tauscope/JointState/2",
@@ -259,32 +259,31 @@ impl SampleKind {
         }
     }
 
-    /// Whether a stream of this kind may hold an alarm.
+    /// Whether a stream of this kind may carry alarms.
     pub fn may_alarm(self) -> bool {
         self == Self::Detection
     }
 }
 
-/// A type that can travel on a link.
+/// A type that links can carry.
 ///
-/// It is plain old data: every bit pattern is a value. Whether it makes sense is another question, which the receiving
-/// end of a link asks with [`Sample::check`] before a stage sees it.
+/// It is plain old data: every bit pattern is a value, but not every value is valid. The receiving end of a link
+/// validates each sample with [`Sample::check`] before a stage gets it.
 pub trait Sample: Pod + Default + std::fmt::Debug + Send + Sync + ZeroCopySend + 'static {
-    /// Which type this is.
+    /// Kind of this type.
     const KIND: SampleKind;
-    /// What every sample begins with.
+    /// The header.
     fn header(&self) -> &Header;
-    /// The same, to be written.
+    /// The header, mutable.
     fn header_mut(&mut self) -> &mut Header;
-    /// This sample where the type was only known at run time.
+    /// The sample as a value whose type is known at run time only.
     fn as_ref(&self) -> SampleRef<'_>;
-    /// Whether a stage may see it: nothing in it may make one panic or spoil its state. Of an end mark only the header
-    /// counts.
+    /// Checks that no value can make a stage panic or corrupt its state. In an end mark only the header is checked.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The first invalid value.
     fn check(&self) -> Result<(), Unsound>;
-    /// As [`SampleRef::is_urgent`].
+    /// See [`SampleRef::is_urgent`].
     fn is_urgent(&self) -> bool {
         self.as_ref().is_urgent()
     }
@@ -304,7 +303,7 @@ pub enum SampleRef<'a> {
 }
 
 impl SampleRef<'_> {
-    /// What the sample begins with.
+    /// The header.
     pub fn header(&self) -> &Header {
         match self {
             Self::JointState(sample) => &sample.header,
@@ -314,8 +313,7 @@ impl SampleRef<'_> {
         }
     }
 
-    /// Whether those who hear it are to have it at once, though more would be cheaper together: an alarm, or what
-    /// somebody told the pipeline.
+    /// Whether the sample is delivered at once, without batching delay: an alarm or a command.
     pub fn is_urgent(&self) -> bool {
         match self {
             Self::JointState(state) => state.command.verb != 0,
@@ -324,7 +322,7 @@ impl SampleRef<'_> {
         }
     }
 
-    /// Which type it is.
+    /// Kind of the sample.
     pub fn kind(&self) -> SampleKind {
         match self {
             Self::JointState(_) => SampleKind::JointState,

@@ -1,7 +1,8 @@
-//! A seat: all that a stage's process must know to take its place in a pipeline.
+//! Seats: the stage assignments of processes. A seat has all that the process of a stage needs to take its place in a
+//! pipeline.
 //!
-//! The program works it out from the pipeline file and hands it to the process as JSON; see
-//! [`shell::child`](crate::shell::child) for how.
+//! The program derives it from the pipeline file and passes it to the process as JSON; see
+//! [`shell::child`](crate::shell::child) for the protocol.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -18,47 +19,46 @@ mod links;
 
 pub use links::{AnyReceiver, Links, Transports};
 
-/// The place of one stage in a pipeline.
+/// The assignment of one stage of a pipeline to a process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Seat {
-    /// The stage's name, unique in the pipeline.
+    /// Name of the stage, unique in the pipeline.
     pub stage: String,
-    /// How often this stage has been started again.
+    /// Number of restarts of the stage.
     #[serde(default)]
     pub restarts: u64,
-    /// The shared memory of this run on this host.
+    /// Shared memory domain of this run on this host.
     pub domain: Domain,
-    /// At most so many receivers hear one stream with one policy here, those included that died and have not been
-    /// cleaned up after; equal for all seats of a domain.
+    /// Largest number of receivers of one stream with one policy on this host, including crashed receivers that are
+    /// not cleaned up yet; equal for all seats of a domain.
     #[serde(default = "Seat::default_receivers")]
     pub receivers: usize,
-    /// Where this process meets the other hosts, if any of its links goes there.
+    /// Endpoints to reach the other hosts, if the process has links to them.
     #[serde(default)]
     pub zenoh: Option<ZenohEndpoints>,
-    /// The cells whose streams it hears; one, unless the stage is a sink.
+    /// Cells whose streams the stage receives; one, unless the stage is a sink.
     #[serde(default)]
     pub cells: Vec<Cell>,
-    /// The streams it hears: none for a source, one for a stage, any number for a sink.
+    /// Streams that the stage receives: none for a source, one for a stage, any number for a sink.
     #[serde(default)]
     pub inputs: Vec<Input>,
-    /// The stream it makes; none for a sink.
+    /// Stream that the stage emits; none for a sink.
     #[serde(default)]
     pub output: Option<Output>,
-    /// Where its health reports go.
+    /// Stream of the stage's health reports.
     #[serde(default)]
     pub health: Option<Output>,
-    /// How long it waits for its receivers before it begins without them \[ms\].
+    /// Longest wait for the receivers, after which the stage starts without them \[ms\].
     #[serde(default = "Seat::default_start_within_ms")]
     pub start_within_ms: u64,
-    /// How long a sender waits for a keep-all receiver that takes nothing \[ms\].
+    /// Stall timeout: longest wait of a sender for a keep-all receiver that takes nothing \[ms\].
     #[serde(default = "Seat::default_patience_ms")]
     pub patience_ms: u64,
-    /// A file in which it keeps its counts ([`Ledger`](crate::shell::Ledger)), if its supervisor wants to know them
-    /// after its death.
+    /// File for the stage's counters ([`Ledger`](crate::shell::Ledger)), which the supervisor reads after a crash.
     #[serde(default)]
     pub ledger: Option<PathBuf>,
-    /// What else the stage needs, in the stage's own words.
+    /// Settings of the stage, in its own format.
     #[serde(default)]
     pub config: serde_json::Value,
 }
@@ -76,7 +76,7 @@ impl Seat {
         PATIENCE.as_millis() as u64
     }
 
-    /// A stage without links yet, with the usual waits.
+    /// A stage without links, with the default timeouts.
     pub fn new(stage: &str, domain: Domain) -> Self {
         Self {
             stage: stage.to_owned(),
@@ -95,68 +95,68 @@ impl Seat {
         }
     }
 
-    /// How long it waits for its receivers before it begins without them.
+    /// Longest wait for the receivers, after which the stage starts without them.
     pub fn start_within(&self) -> Duration {
         Duration::from_millis(self.start_within_ms)
     }
 
-    /// How long a sender waits for a keep-all receiver that takes nothing.
+    /// Stall timeout.
     pub fn patience(&self) -> Duration {
         Duration::from_millis(self.patience_ms)
     }
 }
 
-/// What every stage may know of a robot cell.
+/// Properties of a robot cell that every stage may know.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cell {
-    /// Its name, the first part of its streams' names.
+    /// Name of the cell, the first part of its streams' names.
     pub name: String,
-    /// The joints, in the order of every [`JointArray`](crate::JointArray).
+    /// Names of the joints, in the order of every [`JointArray`](crate::JointArray).
     pub joints: Vec<String>,
-    /// What an effort means here.
+    /// Unit of the efforts.
     pub effort_unit: EffortUnit,
 }
 
-/// How a stream gets from one stage to another.
+/// Transport of a stream from one stage to another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TransportKind {
-    /// Both stages are in one [`Tree`](crate::shell::Tree): each sample is handed over where it lies.
+    /// Calls within one stage group ([`Tree`](crate::shell::Tree)), which pass each sample in place.
     InProcess,
     /// Shared memory, within a host.
     Iceoryx2,
-    /// Across hosts.
+    /// Network, across hosts.
     Zenoh,
 }
 
-/// A stream that a stage hears.
+/// A stream that a stage receives.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Input {
-    /// The stage that makes it.
+    /// Name of the stage that emits the stream.
     pub from: String,
-    /// Its name: `<cell>/<stage>`, or `<cell>/<stage>/health`.
+    /// Name of the stream: `<cell>/<stage>`, or `<cell>/<stage>/health`.
     pub stream: String,
-    /// What it carries.
+    /// Sample type.
     pub kind: SampleKind,
-    /// How it comes here.
+    /// Transport.
     pub transport: TransportKind,
-    /// What becomes of samples this stage has no room for.
+    /// Overflow policy.
     #[serde(default)]
     pub keep: Keep,
-    /// How many samples it may leave unread.
+    /// Largest number of unread samples.
     pub depth: usize,
-    /// How it learns that a sample is there, if that comes through shared memory.
+    /// Wake-up mode of the receiver, for shared memory.
     #[serde(default)]
     pub wake: Wake,
-    /// How far an earlier life of this stage has come, so that what was lost with it is counted.
+    /// Position of an earlier incarnation of this stage, so that samples lost in its crash are counted.
     #[serde(default)]
     pub resume: Option<Position>,
 }
 
 impl Input {
-    /// How often it is looked whether samples are there, where nothing wakes the one who hears it.
+    /// Polling interval, if no notification wakes the receiver.
     pub(crate) fn looks(&self) -> Option<Duration> {
         let is_woken = match self.wake {
             Wake::EveryMs(_) => false,
@@ -168,31 +168,31 @@ impl Input {
     }
 }
 
-/// A stream that a stage makes.
+/// A stream that a stage emits.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
-    /// Its name: `<cell>/<stage>`, or `<cell>/<stage>/health`.
+    /// Name of the stream: `<cell>/<stage>`, or `<cell>/<stage>/health`.
     pub stream: String,
-    /// What it carries.
+    /// Sample type.
     pub kind: SampleKind,
-    /// How many samples earlier lives of the stage have put out.
+    /// Number of samples that earlier incarnations of the stage have emitted.
     #[serde(default)]
     pub former: u64,
-    /// The ways it leaves its tree; none if nobody listens elsewhere.
+    /// Links to receivers outside the stage group; none if there are no such receivers.
     #[serde(default)]
     pub links: Vec<OutputLink>,
 }
 
-/// One way that a stream leaves.
+/// One link of an output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutputLink {
-    /// How.
+    /// Transport.
     pub transport: TransportKind,
-    /// Who listens there.
+    /// Expected receivers.
     pub audience: Audience,
-    /// The queue before it, if the stage is not to wait for those who listen.
+    /// Limits of the queue in front of the link, if the stage must not wait for its receivers.
     #[serde(default)]
     pub spill: Option<SpillSettings>,
 }

@@ -1,12 +1,12 @@
-//! Shells: the loops around a source, a stage or a sink that feed it, count, report its health and
-//! pass the end of the stream on.
+//! Shells: the run loops around a source, a stage or a sink. They feed it, count samples, report its health and pass
+//! on the end of the stream.
 //!
-//! - [`run_source`], [`run_stage`], [`run_sink`] run one over links that are open; they return a
-//!   [`Report`] however it ends.
-//! - [`Tree`] is the loop around a source or a link and all stages that hang on it in one process; [`crew`] runs any
-//!   number of trees in one process.
-//! - [`child`] runs a stage in a process of its own, which takes its [`Seat`](crate::Seat) from standard
-//!   input; [`outside`] is all that the `main` of a stage from another crate needs.
+//! - [`run_source`], [`run_stage`], [`run_sink`] run one stage over open links and return a [`Report`], also after a
+//!   failure.
+//! - [`Tree`] is the run loop of a stage group: a source or a link, and all stages behind it in one thread. [`crew`]
+//!   runs any number of stage groups in one worker process.
+//! - [`child`] runs a stage in a process of its own, which reads its [`Seat`](crate::Seat) from standard
+//!   input; [`outside`] is the complete `main` of a stage from another crate.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -31,49 +31,49 @@ pub use single::{run_source, run_stage};
 pub use sink::{SinkInput, run_sink};
 pub use tree::Tree;
 
-/// How long a shell waits for a sample before it looks whether it is to stop.
-/// Resolution: how soon a stop is noticed, against how often the stage wakes up.
+/// Longest wait for a sample between two checks for a stop request.
+/// Resolution: delay of a stop, against the number of wake-ups.
 const TICK: Duration = Duration::from_millis(100);
-/// How long a stage that has ended stays for receivers that have not read all of its stream yet.
-/// Resolution: how long the end of a run may take.
+/// Longest time that a terminating stage waits for receivers that have not read all of its stream.
+/// Resolution: duration of a shutdown.
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
 
-/// Tells a shell to stop. Clones are one.
+/// Stop request to a shell. Clones share it.
 #[derive(Debug, Clone, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Nobody is to stop yet.
+    /// A flag without a request yet.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The shell deals with what has arrived, completes its output and returns.
+    /// Requests a stop: the shell processes the samples that have arrived, completes its output and returns.
     pub fn stop(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it is to stop.
+    /// Whether a stop is requested.
     pub fn is_stopped(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// What every shell needs besides the stage and its links.
+/// Context of a shell, in addition to the stage and its links.
 #[derive(Debug, Clone, Default)]
 pub struct Context {
-    /// The stage's name.
+    /// Name of the stage.
     pub stage: String,
-    /// How often it has been started again.
+    /// Number of restarts of the stage.
     pub restarts: u64,
-    /// Ends it.
+    /// Stop request.
     pub stop: Stop,
-    /// Where others see how it fares.
+    /// Status board for the stage's reports.
     pub board: Board,
 }
 
 impl Context {
-    /// For the stage of that name, started for the first time.
+    /// Context of the stage of that name, without restarts.
     pub fn new(stage: &str) -> Self {
         Self {
             stage: stage.to_owned(),

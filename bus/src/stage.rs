@@ -1,7 +1,7 @@
-//! What a stage is, to those that run it.
+//! Traits of the stages.
 //!
-//! Three roles, so that a wrong wiring does not compile: a [`Source`] makes a stream, a [`Stage`]
-//! turns one into another, a [`Sink`] takes many and gives none.
+//! There are three roles, so that wrong wiring does not compile: a [`Source`] emits a stream, a [`Stage`] transforms
+//! one stream into another, and a [`Sink`] accepts any number of streams and emits none.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -10,26 +10,26 @@ use crate::link::LinkError;
 use crate::sample::{Sample, SampleRef};
 use crate::trouble::Trouble;
 
-/// Where a stage puts its output: a slot is loaned, written in place and sent.
+/// Output of a stage: it loans a slot, which is written in place and sent.
 pub trait Emit<T: Sample> {
     /// Loans a slot (a default `T`), lets `write` fill it, and sends it. The sequence number is set
     /// by the link.
     ///
     /// # Errors
-    /// What the link says if it cannot send.
+    /// If the link cannot send.
     fn emit(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError>;
 }
 
-/// Why a stage cannot go on.
+/// Failure of a stage.
 #[derive(Debug, thiserror::Error)]
 pub enum StageError {
-    /// The link it writes to failed.
+    /// Failure of the output link.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// What it reads from or writes to failed.
+    /// Failure of the stage itself, or of a resource that it reads or writes.
     #[error("{0}")]
     Failed(#[source] Box<dyn std::error::Error + Send + Sync>),
-    /// Its input is not what it was configured for: it would fail again however often it is started.
+    /// Input that does not match the configuration: every restart would fail again.
     #[error("{0}")]
     Unfit(String),
 }
@@ -41,37 +41,37 @@ impl StageError {
     }
 }
 
-/// What a source has to say after a step.
+/// State of a source after a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
-    /// More may follow at once.
+    /// More samples may follow at once.
     More,
-    /// Nothing now; a live source waits for its peer. Ask again soon.
+    /// No data now, for example a live source that waits for its peer; call again soon.
     Idle,
     /// The source has ended.
     End,
 }
 
-/// Makes a stream. The only stage that may do input of its own, and wait.
+/// Emits a stream. The only kind of stage that may read input of its own, and block.
 pub trait Source<T: Sample>: Send {
-    /// Emits what comes next, at most a few samples, and returns within a tenth of a second.
+    /// Emits the next samples, at most a few, and returns within 0.1 s.
     ///
     /// # Errors
     /// If the source cannot be read any further.
     fn step(&mut self, out: &mut dyn Emit<T>) -> Result<Progress, StageError>;
 
-    /// Samples this source had to drop so far (NaN, unreadable), and what was lost on the way to it.
+    /// Number of samples dropped so far (NaN, unreadable) or lost on the way to this source.
     fn dropped(&self) -> u64 {
         0
     }
 
-    /// How far a source of known length is, from 0 to 1, for a progress bar.
+    /// Progress of a source of known length, from 0 to 1, for a progress bar.
     fn fraction_done(&self) -> Option<f64> {
         None
     }
 
-    /// Why nothing that can be used comes, `silent_for` after the last sample (or the start); `None` while all is
-    /// well. Asked twice a second, and answers within a tenth of one.
+    /// Reason why no usable data arrives, `silent_for` after the last sample (or the start); `None` while data
+    /// arrives. Called twice a second; must return within 0.1 s.
     fn trouble(&mut self, _silent_for: Duration) -> Option<Trouble> {
         None
     }
@@ -113,23 +113,23 @@ impl<T: Sample, S: Source<T> + ?Sized> Source<T> for &mut S {
     }
 }
 
-/// Turns a stream into another: a pure state machine, without I/O and without a clock of its own.
+/// Transforms a stream into another: a pure state machine, without I/O and without a clock of its own.
 pub trait Stage<I: Sample, O: Sample>: Send {
-    /// Takes one sample and emits what follows from it.
+    /// Processes one sample and emits the results.
     ///
     /// # Errors
-    /// If the output cannot be sent, or the stage cannot go on.
+    /// If the output cannot be sent, or the stage fails.
     fn accept(&mut self, sample: &I, out: &mut dyn Emit<O>) -> Result<(), StageError>;
 
-    /// The input has ended: emits what is still held back.
+    /// Emits the pending results, after the end of the input.
     ///
     /// # Errors
-    /// As [`Stage::accept`].
+    /// See [`Stage::accept`].
     fn finish(&mut self, _out: &mut dyn Emit<O>) -> Result<(), StageError> {
         Ok(())
     }
 
-    /// Samples this stage had to refuse so far.
+    /// Number of samples refused so far.
     fn dropped(&self) -> u64 {
         0
     }
@@ -149,15 +149,15 @@ impl<I: Sample, O: Sample, S: Stage<I, O> + ?Sized> Stage<I, O> for &mut S {
     }
 }
 
-/// Takes any number of streams. The only stage besides a source that may do I/O.
+/// Accepts any number of streams. The only kind of stage, except for a source, that may do I/O.
 pub trait Sink: Send {
-    /// Takes one sample of the stream that the stage named `from` puts out.
+    /// Processes one sample of the stream that the stage named `from` emits.
     ///
     /// # Errors
     /// If it cannot be written.
     fn accept(&mut self, from: &str, sample: SampleRef<'_>) -> Result<(), StageError>;
 
-    /// Called about ten times a second while nothing comes, so that nothing stays in a buffer.
+    /// Called about ten times a second while no samples arrive, to flush buffers.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -165,22 +165,22 @@ pub trait Sink: Send {
         Ok(())
     }
 
-    /// Nothing more will come, though an input has not ended: a stage before it has failed. [`finish`](Self::finish)
-    /// follows.
+    /// Called before [`finish`](Self::finish) if no more samples arrive although an input has not ended, for example
+    /// because a preceding stage has failed.
     fn cut_short(&mut self) {}
 
-    /// All inputs have ended: completes what was written.
+    /// Completes the output, after the last sample.
     ///
     /// # Errors
-    /// If it cannot be completed.
+    /// If the output cannot be completed.
     fn finish(&mut self) -> Result<(), StageError>;
 
-    /// The files that it completed last, and how many in all.
+    /// The files completed last, and the number of all completed files.
     fn completed_files(&self) -> (&[PathBuf], u64) {
         (&[], 0)
     }
 
-    /// Samples this sink had to drop so far.
+    /// Number of samples dropped so far.
     fn dropped(&self) -> u64 {
         0
     }

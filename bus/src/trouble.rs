@@ -1,29 +1,29 @@
-//! Why a source gives nothing that can be used: what it waits for, what is there instead, and the likeliest slip.
+//! Diagnosis of a source without usable data: expected data, data seen instead, and the most likely mistake.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Lines of a list that are kept; the rest is only counted.
+/// Largest number of lines in a list; further lines are only counted.
 const MAX_LINES: usize = 12;
-/// Longer lines are cut.
+/// Longest line \[characters\]; longer lines are cut.
 const MAX_CHARS: usize = 400;
 
-/// Why a source gives nothing that can be used, for people. Bounded, whatever goes into it.
+/// Diagnosis of a source without usable data, for people. Its size is bounded for any input.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Trouble {
-    /// What is wrong, in a sentence without figures that change: who has read it once need not read it again.
+    /// Problem in one sentence, without varying numbers, so that a repeated report reads the same.
     pub what: String,
-    /// What is waited for, a line each.
+    /// Expected data, one line each.
     pub expected: Vec<String>,
-    /// What is there instead, a line each.
+    /// Data seen instead, one line each.
     pub seen: Vec<String>,
-    /// The likeliest slip, and its remedy.
+    /// Most likely mistake, and its remedy.
     pub likely: Option<String>,
 }
 
 impl Trouble {
-    /// What is wrong.
+    /// A diagnosis of the problem `what`.
     pub fn new(what: impl Into<String>) -> Self {
         Self {
             what: cut(what.into()),
@@ -31,34 +31,34 @@ impl Trouble {
         }
     }
 
-    /// Adds what is waited for.
+    /// Adds expected data.
     #[must_use]
     pub fn expects(mut self, lines: impl IntoIterator<Item = String>) -> Self {
         add(&mut self.expected, lines);
         self
     }
 
-    /// Adds what is there instead.
+    /// Adds data seen instead.
     #[must_use]
     pub fn sees(mut self, lines: impl IntoIterator<Item = String>) -> Self {
         add(&mut self.seen, lines);
         self
     }
 
-    /// Says what the slip probably is, unless that is said already.
+    /// Sets the most likely mistake, unless it is set already.
     #[must_use]
     pub fn likely(mut self, slip: Option<String>) -> Self {
         self.likely = self.likely.or(slip.map(cut));
         self
     }
 
-    /// Whether both say the same is wrong; what is seen may differ by the hour.
+    /// Whether both report the same problem, whatever data was seen.
     pub fn is_like(&self, other: &Self) -> bool {
         self.what == other.what && self.likely == other.likely
     }
 }
 
-/// What is wrong, then a line each for what is waited for, what is there, and the slip.
+/// The problem, then one line each for expected data, data seen and the likely mistake.
 impl fmt::Display for Trouble {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.what)?;

@@ -1,4 +1,4 @@
-//! A network that breaks between two hosts: what it swallows comes once it is mended.
+//! Network failure between two hosts: lost samples are retransmitted once the network is back.
 
 // Helpers outside a test function.
 #![allow(clippy::unwrap_used)]
@@ -16,7 +16,7 @@ use tauscope_bus::{
 
 const LONG: Duration = Duration::from_secs(20);
 
-/// Passes connections on to another address until it is cut.
+/// Forwards connections to another address until it is cut.
 struct Proxy {
     address: SocketAddr,
     cut: Arc<AtomicBool>,
@@ -50,11 +50,11 @@ impl Proxy {
         proxy
     }
 
-    /// Ends all connections and takes no new ones.
+    /// Closes all connections and accepts no new ones.
     fn cut(&self) {
         self.cut.store(true, Ordering::Relaxed);
         for connection in self.connections.lock().unwrap().drain(..) {
-            // It may be gone already.
+            // It may be closed already.
             let _ = connection.shutdown(Shutdown::Both);
         }
     }
@@ -83,7 +83,7 @@ fn missing_becomes(sender: &mut dyn Sender<JointState>, missing: usize) {
 
 #[test]
 fn what_a_broken_network_swallows_comes_once_it_is_mended() {
-    // Another process may be quicker to take a port that was free.
+    // Another process may take a free port first.
     let (a, address) = std::iter::repeat_with(|| {
         let port = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = port.local_addr().unwrap();
@@ -137,13 +137,13 @@ fn what_a_broken_network_swallows_comes_once_it_is_mended() {
     assert_eq!(sender.counts().undelivered, 0);
 }
 
-/// Where nobody listens right now.
+/// Endpoint with a free port.
 fn free() -> String {
     let port = TcpListener::bind("127.0.0.1:0").unwrap();
     format!("tcp/{}", port.local_addr().unwrap())
 }
 
-/// A router there; the port may still be taken by what another one left.
+/// Opens a router at `listen`, with retries while an earlier one still occupies the port.
 fn router(listen: &str, connect: &[String]) -> ZenohRouter {
     let endpoints = ZenohEndpoints {
         listen: vec![listen.to_owned()],
@@ -159,7 +159,7 @@ fn router(listen: &str, connect: &[String]) -> ZenohRouter {
     attempts.find_map(Result::ok).expect("a router")
 }
 
-/// Two hosts, each with a router of its own, that meet at a third one.
+/// Two hosts, each with a router of its own, that are connected through a third router.
 #[test]
 fn a_router_that_is_started_again_costs_nothing() {
     let between = free();

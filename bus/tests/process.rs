@@ -20,7 +20,7 @@ use tauscope_bus::{
 const LONG: Duration = Duration::from_secs(20);
 const DEPTH: usize = 64;
 
-/// Passes stamps on.
+/// Emits a sample with the same stamp for each input.
 struct Echo;
 
 impl Stage<JointState, TwinState> for Echo {
@@ -41,11 +41,11 @@ fn a_stage_process() {
         Some(reason) => Err(std::io::Error::other(reason.to_owned())),
         None => Ok(Echo),
     });
-    // Not back into the test harness, which has an exit code of its own.
+    // Exits without returning to the test harness, which has an exit code of its own.
     std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
 }
 
-/// Both sides of the stage, and its supervisor.
+/// The links to both sides of the stage, and its supervisor.
 struct Around {
     domain: Domain,
     links: Option<SharedMemory>,
@@ -109,7 +109,7 @@ impl Drop for Around {
     }
 }
 
-/// The stage's process as a supervisor holds it.
+/// The process of a stage, as its supervisor sees it.
 struct Process {
     child: Child,
     input: Option<ChildStdin>,
@@ -138,7 +138,7 @@ impl Process {
         Self::start(&serde_json::to_string(seat).unwrap())
     }
 
-    /// The next line of the protocol; the test harness says some things of its own.
+    /// The next line of the protocol; lines of the test harness are skipped.
     fn line(&mut self) -> Line {
         loop {
             let mut text = String::new();
@@ -173,7 +173,7 @@ impl Process {
     }
 }
 
-/// Lets both sides look for the stage until all have met.
+/// Polls both sides of the stage until all are connected.
 fn meet(process: &mut Process, sender: &mut dyn Sender<JointState>, sinks: &mut Sinks) {
     std::thread::scope(|scope| {
         let ready = scope.spawn(|| process.line());
@@ -220,7 +220,7 @@ impl Sinks {
         stamps
     }
 
-    /// Both streams to their end.
+    /// Receives both streams to their end.
     fn take_to_end(&mut self) {
         let deadline = Instant::now() + LONG;
         for receive in [
@@ -265,7 +265,7 @@ fn a_killed_stage_is_started_again_and_its_loss_is_counted() {
     assert!(around.links().clean_dead_peers() > 0);
     let begin = Instant::now();
     send(&mut *sender, 10..10 + 2 * DEPTH as i64);
-    assert!(begin.elapsed() < PATIENCE, "nobody waits for the dead");
+    assert!(begin.elapsed() < PATIENCE, "waits for a crashed receiver");
     assert_eq!(sender.counts().undelivered, 2 * DEPTH as u64);
 
     let mut seat = around.seat();

@@ -1,4 +1,4 @@
-//! Shells around a source, a stage and a sink that are joined in process.
+//! Shells around a source, a stage and a sink, linked in process.
 
 // Helpers outside a test function.
 #![allow(clippy::unwrap_used)]
@@ -17,7 +17,7 @@ use tauscope_bus::{
 
 const MS: i64 = 1_000_000;
 
-/// Counts at 100 Hz of stream time, for ever unless it has a length.
+/// Emits samples at 100 Hz of stream time, without an end unless it has a length.
 struct Counter {
     next: i64,
     length: i64,
@@ -38,7 +38,7 @@ impl Source<JointState> for Counter {
     }
 }
 
-/// Passes stamps on, one sample late.
+/// Emits the stamp of the previous sample.
 #[derive(Default)]
 struct Delay {
     held: Option<i64>,
@@ -110,7 +110,7 @@ struct Chain {
     seen: Arc<Mutex<Seen>>,
 }
 
-/// A source, a stage and a sink that hears both and the stage's health.
+/// A source, a stage, and a sink that receives both streams and the stage's health.
 fn run_chain(length: i64, stop_after: Option<Duration>) -> Chain {
     let links = InProcess::new();
     let both = Audience::of(Keep::All, 2);
@@ -231,7 +231,7 @@ fn health_comes_once_a_second_of_stream_time_and_at_the_end() {
     let seconds = (1..10).map(|s| s * 1_000).chain([9_990]);
     assert!(stamps.iter().copied().eq(seconds), "{stamps:?}");
     assert!(seen.health.iter().all(|h| h.stage.as_str() == "delay"));
-    // The sample that began the second is through; the stage holds one back.
+    // The first sample of the second is processed; the stage holds one sample back.
     assert_eq!(
         (seen.health[0].received, seen.health[0].emitted),
         (101, 100)

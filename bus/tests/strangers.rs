@@ -1,5 +1,5 @@
-//! Somebody on the network who is no stage of the pipeline, through a real session: nothing that he says is heard, ends
-//! a stream or stops a stage.
+//! A participant of the network that is not a stage of the pipeline, over a real session: none of its messages is
+//! accepted, ends a stream or stops a stage.
 
 // Helpers outside a test function.
 #![allow(clippy::unwrap_used)]
@@ -16,17 +16,17 @@ use zenoh::bytes::Encoding;
 const LONG: Duration = Duration::from_secs(20);
 const KIND: &str = "tauscope/JointState/2";
 
-/// A stage that sends, one that hears it, and a stranger on the same network.
+/// A sending stage, a receiving stage, and a stranger on the same network.
 struct Scene {
     sender: Box<dyn Sender<JointState>>,
     receiver: Box<dyn Receiver<JointState>>,
     stranger: zenoh::Session,
-    /// A session ends with its last transport.
+    /// Keeps the sessions open: a session ends with its last transport.
     _links: [Zenoh; 2],
 }
 
 fn scene(keep: Keep) -> Scene {
-    // Another process may be quicker to take a port that was free.
+    // Another process may take a free port first.
     let (links, endpoint) = std::iter::repeat_with(|| {
         let port = TcpListener::bind("127.0.0.1:0").unwrap();
         let endpoint = format!("tcp/{}", port.local_addr().unwrap());
@@ -56,7 +56,7 @@ fn scene(keep: Keep) -> Scene {
     }
 }
 
-/// Waits until the stranger's session knows who listens.
+/// Waits until the stranger's session has discovered the receiver.
 fn reaches(stranger: &zenoh::Session, keep: Keep) {
     let key = match keep {
         Keep::All => "cell/ingest",
@@ -76,7 +76,7 @@ fn state(stamp: i64) -> JointState {
     state
 }
 
-/// What goes beside a sample of that sender.
+/// Attachment of a message from this sender.
 fn beside(instance: u64) -> Vec<u8> {
     [instance, 0, 0, 0].map(u64::to_le_bytes).concat()
 }
@@ -110,7 +110,7 @@ impl Scene {
         }
     }
 
-    /// Waits until so many messages have been refused; nothing may be heard meanwhile.
+    /// Waits until `foreign` messages have been refused; no sample may arrive meanwhile.
     fn refuses(&mut self, foreign: u64) {
         let deadline = Instant::now() + LONG;
         while self.receiver.counts().foreign < foreign {
@@ -157,7 +157,7 @@ fn an_end_mark_of_a_stranger_ends_nothing() {
 #[test]
 fn joint_states_of_a_stranger_are_not_taken_as_real() {
     let mut scene = scene(Keep::All);
-    // Also before the first sample.
+    // A forged sample before the first real one.
     let forged = state(999);
     scene.says(
         "cell/ingest",
@@ -168,7 +168,7 @@ fn joint_states_of_a_stranger_are_not_taken_as_real() {
     scene.refuses(1);
     scene.send(0..3);
     assert_eq!(scene.take(3), [0, 1, 2]);
-    // One who shows a token, too, is still not the sender that lives.
+    // A token does not make a stranger the sender while the real sender is alive.
     let token = scene.stranger.liveliness();
     let _token = token
         .declare_token("cell/ingest/@from/0000000000000007")
@@ -227,10 +227,10 @@ fn what_a_stranger_says_in_the_name_of_a_receiver_harms_no_sender() {
     let mut scene = scene(Keep::All);
     let nonsense = [u64::MAX; 4].map(u64::to_le_bytes).concat();
     for payload in [&nonsense[..], &nonsense[..9], &[]] {
-        scene.says("cell/ingest/@taken/nobody.64", "", payload, None);
+        scene.says("cell/ingest/@taken/unknown.64", "", payload, None);
     }
     let token = scene.stranger.liveliness();
-    // Room for more than there is, or for nothing that is a number.
+    // Credits that overflow, are negative or are missing.
     for id in ["x.99999999999999999999", "y.-1", "z"] {
         let token = token.declare_token(format!("cell/ingest/@all/{id}")).wait();
         token.unwrap().undeclare().wait().unwrap();

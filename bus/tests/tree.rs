@@ -1,4 +1,4 @@
-//! A tree of stages in one thread: what goes where, and what happens where one of them fails.
+//! A stage group in one thread: routing of samples, and failures of a stage.
 
 // Helpers outside a test function.
 #![allow(clippy::unwrap_used)]
@@ -48,7 +48,7 @@ impl Stage<JointState, TwinState> for Twin {
 
 type Heard = Arc<Mutex<Vec<(&'static str, i64)>>>;
 
-/// What a detector does at the stamp 50.
+/// Behaviour of a detector at the stamp 50.
 #[derive(Clone, Copy, PartialEq)]
 enum Mood {
     Well,
@@ -88,7 +88,7 @@ fn post(links: &InProcess, stage: &str, from: &str) -> Post<'static> {
     }
 }
 
-/// A source, a twin, whose stream is heard outside as well, and two detectors, the second in this mood.
+/// A source, a twin whose stream also has a receiver outside the group, and two detectors, the second in this mood.
 fn run(mood: Mood) -> (Vec<Report>, Vec<(&'static str, i64)>, Vec<i64>) {
     let links = InProcess::new();
     let mut outside: Box<dyn Receiver<TwinState>> =
@@ -155,12 +155,12 @@ fn a_stage_that_hangs_is_named_though_others_share_its_thread() {
         let reports = tree.run(&context);
         assert!(reports.iter().all(Report::is_complete), "{reports:?}");
     });
-    // One that has ended is not stuck.
+    // A group that has ended is not hung.
     let later = std::time::Instant::now() + soon;
     assert_eq!(context.board.stuck(later), None);
 }
 
-/// Does not finish its tenth sample before it may.
+/// Blocks at the stamp 10 until it is released.
 struct Stuck(std::sync::mpsc::Receiver<()>);
 
 impl Stage<TwinState, Detection> for Stuck {

@@ -1,5 +1,5 @@
-//! Samples that wait for more, and those that do not: alarms and commands.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+//! Batching delay of samples, and urgent samples without it: alarms and commands.
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::time::{Duration, Instant};
 
@@ -9,9 +9,9 @@ use tauscope_bus::{
     SharedMemory, Transport, Verb, Wake, Zenoh, ZenohEndpoints, flags,
 };
 
-/// What is not urgent waits so long.
+/// Batching delay of samples that are not urgent.
 const WAIT: Duration = Duration::from_secs(3);
-/// What comes within so long was not waited with.
+/// Delay up to which a sample was sent without batching delay.
 const AT_ONCE: Duration = Duration::from_secs(1);
 const PATIENCE: Duration = Duration::from_secs(10);
 
@@ -24,14 +24,14 @@ fn alarm(detection: &mut Detection) {
     detection.event = Detection::ONSET;
 }
 
-/// When the next sample came, after `begin`.
+/// Time from `begin` to the next sample.
 fn comes<T: Sample>(receiver: &mut dyn Receiver<T>, begin: Instant) -> Duration {
     let received = receiver.receive(WAIT * 3, &mut |_| {}).unwrap();
     assert_eq!(received, Received::Sample);
     begin.elapsed()
 }
 
-/// The first sample is heard at once, so that the ends know each other; the next has been sent since.
+/// Checks that an alarm ends the batching delay. The first sample ensures that both ends are connected.
 fn waits_but_for_an_alarm(transports: [&(impl Transport + Sync); 2]) {
     let [sending, receiving] = transports;
     let audience = Audience::of(Keep::Newest, 1);
@@ -52,7 +52,7 @@ fn waits_but_for_an_alarm(transports: [&(impl Transport + Sync); 2]) {
         let mut receiver = hears.join().unwrap();
         let begin = Instant::now();
         let sends = scope.spawn(move || {
-            // While somebody waits for it.
+            // Sent while the receiver waits.
             std::thread::sleep(Duration::from_millis(100));
             sender.send_with(&mut calm).unwrap();
             std::thread::sleep(Duration::from_millis(100));
@@ -72,7 +72,7 @@ fn waits_but_for_an_alarm(transports: [&(impl Transport + Sync); 2]) {
             sender
         });
         let took = comes(&mut *receiver, begin);
-        assert!(took > AT_ONCE, "it was not waited for more: {took:?}");
+        assert!(took > AT_ONCE, "sent without batching delay: {took:?}");
         drop(sends.join().unwrap());
     });
 }
@@ -88,7 +88,7 @@ fn a_publisher_in_shared_memory_is_woken_for_an_alarm_alone() {
     domain.remove().unwrap();
 }
 
-/// Two sessions, of which the sending one gathers.
+/// Two sessions, the sending one with a batching delay.
 fn sessions() -> [Zenoh; 2] {
     let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let endpoint = format!("tcp/{}", port.local_addr().unwrap());
@@ -140,7 +140,7 @@ fn a_command_over_zenoh_goes_at_once_and_so_does_what_fills_a_message() {
             assert!(comes(&mut *receiver, begin) < AT_ONCE);
         }
     }
-    // Half of what a message holds goes without waiting; the rest waits for more.
+    // The samples of a full message are sent without batching delay; the rest waits.
     comes(&mut *receiver, begin);
     assert!(begin.elapsed() < AT_ONCE);
     sender.end().unwrap();
@@ -149,5 +149,5 @@ fn a_command_over_zenoh_goes_at_once_and_so_does_what_fills_a_message() {
         heard += 1;
     }
     assert_eq!(heard, 100);
-    assert!(begin.elapsed() < WAIT, "the end waits for nobody");
+    assert!(begin.elapsed() < WAIT, "the end was delayed");
 }

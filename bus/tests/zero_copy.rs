@@ -1,4 +1,4 @@
-//! A sample is not copied between the slot that a stage fills and what the reader sees.
+//! Zero copy: the reader gets the slot that the stage has filled.
 
 // Helpers outside a test function.
 #![allow(clippy::unwrap_used)]
@@ -36,12 +36,12 @@ impl Stage<JointState, TwinState> for Twin {
     }
 }
 
-/// A place in memory, whoever looks at it.
+/// A location in memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Place {
     /// An address of this process.
     Address(usize),
-    /// A byte of a file that is mapped.
+    /// A byte of a mapped file, independent of the mapping.
     Mapped {
         device: String,
         inode: u64,
@@ -53,7 +53,7 @@ fn address(sample: &TwinState) -> Place {
     Place::Address(std::ptr::from_ref(sample).addr())
 }
 
-/// The byte of the shared segment that `sample` begins at, from the kernel's list of what is mapped:
+/// The byte of the shared segment at which `sample` begins, from the kernel's list of mappings:
 /// `start-end permissions offset device inode path`.
 fn place_in_segment(sample: &TwinState) -> Place {
     let address = std::ptr::from_ref(sample).addr();
@@ -74,7 +74,7 @@ fn place_in_segment(sample: &TwinState) -> Place {
     panic!("{address:x} is not mapped");
 }
 
-/// Runs the twin over three samples; where it wrote, and where the reader saw what it wrote.
+/// Runs the twin over three samples, and returns the places where it wrote and where the reader read.
 fn run(transport: &impl Transport, place_of: fn(&TwinState) -> Place) -> (Vec<Place>, Vec<Place>) {
     let before = InProcess::new();
     let one = Audience::of(Keep::All, 1);
@@ -136,8 +136,7 @@ fn over_shared_memory_the_reader_sees_the_byte_of_the_segment_that_was_written()
         let links = SharedMemory::open(&domain).unwrap();
         let (wrote, saw) = run(&links, place_in_segment);
         assert_eq!(wrote, saw);
-        // Both ends have mapped the segment for themselves, as two processes would: the same byte
-        // at another address.
+        // Each end has a mapping of its own, as in two processes: the same byte has another address.
         let (wrote, saw) = run(&links, address);
         assert!(wrote.iter().all(|place| !saw.contains(place)));
     }

@@ -1,5 +1,5 @@
-//! One arm: what its series say together. A load changes several joints in the way of a mass, and the payload has a series
-//! of its own; wear changes one joint's friction; warmth goes with temperature.
+//! Diagnosis of one arm from all of its series. A load changes several joints in the pattern of a mass, and the
+//! payload has a series of its own; wear changes the friction of one joint; warmth follows the temperature.
 
 use crate::finding::{Cause, Finding};
 use crate::forecast::forecast;
@@ -9,17 +9,17 @@ use crate::shape::Shape;
 use crate::watch::{Event, watch};
 use crate::words;
 
-/// Changes that begin within so many days of each other may have one cause.
-/// Resolution: the nights that a small change takes to be certain.
+/// Largest time between the onsets of changes that may have one cause \[days\].
+/// Resolution: the number of nights until a small change is detected.
 const TOGETHER_D: f64 = 10.0;
-/// Warmth is told if it changes friction by this share.
-/// Resolution: twice what is told of wear; every gear follows the season a little.
+/// Smallest change of friction by warmth that is reported, as a share of the level.
+/// Resolution: twice the reporting threshold for wear; every gear follows the season a little.
 const WARM_SHARE: f64 = 0.1;
-/// The friction of so many joints, and of half of the arm's, does not wear at once.
+/// Fewest joints, and at least half of the arm's, whose simultaneous change of friction is not wear.
 /// Resolution: three gears, of an arm of six.
 const MANY_JOINTS: usize = 3;
 
-/// An event and the series that it is in.
+/// An event and its series.
 #[derive(Clone, Copy)]
 struct Told<'a> {
     series: &'a Series,
@@ -27,8 +27,8 @@ struct Told<'a> {
     event: Event,
 }
 
-/// What changed in an arm since the newest of `baselines` \[days since 1970-01-01 UTC\]: maintenance notes, after which it
-/// is another arm. The newest finding first.
+/// Returns the changes of an arm since the newest of `baselines` \[days since 1970-01-01 UTC\], the newest finding
+/// first. Baselines are maintenance notes: estimates before them no longer describe the arm.
 pub fn assess(all: &[Series], baselines: &[f64]) -> Vec<Finding> {
     let since = baselines.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let all: Vec<Series> = all.iter().map(|one| behind(one, since)).collect();
@@ -54,7 +54,7 @@ pub fn assess(all: &[Series], baselines: &[f64]) -> Vec<Finding> {
     let mut findings = payloads(&mut told);
     findings.extend(frictions(&mut told, joints(&all)));
     findings.extend(told.into_iter().map(|one| finding(other(&one), &one)));
-    // What is told of a joint explains its warmth as well.
+    // A joint with another finding is not reported for warmth in addition.
     warm.retain(|one: &Finding| findings.iter().all(|told| told.joint != one.joint));
     findings.extend(shared(one_a_joint(warm), joints(&all)));
     findings.sort_by(|a, b| {
@@ -65,7 +65,7 @@ pub fn assess(all: &[Series], baselines: &[f64]) -> Vec<Finding> {
     findings
 }
 
-/// The series since a time.
+/// The series since a time, sorted by time.
 fn behind(series: &Series, since: f64) -> Series {
     let estimates = series.estimates.iter().copied();
     let mut estimates: Vec<_> = estimates.filter(|one| one.day >= since).collect();
@@ -83,12 +83,12 @@ fn joints(all: &[Series]) -> usize {
     names.len()
 }
 
-/// Whether one of two events was certain before the other one began: they have two causes.
+/// Whether one of two events was detected before the other one began, so that they have different causes.
 fn apart(a: &Event, b: &Event) -> bool {
     a.told < b.from || b.told < a.from
 }
 
-/// Whether the event `b` may be an effect of what began with `a`. One that was certain before that is none.
+/// Whether the event `b` may have the same cause as `a`. An event that was detected before `a` began does not.
 fn together(a: &Event, b: &Event) -> bool {
     if b.told < a.from {
         return false;
@@ -98,13 +98,13 @@ fn together(a: &Event, b: &Event) -> bool {
     begun_together || (b.from >= a.from - TOGETHER_D && over(b) <= over(a))
 }
 
-/// Takes the payloads out of what is told, and all that they make of other series.
+/// Moves the payload events out of `told` as findings, and removes their effects on other series.
 fn payloads(told: &mut Vec<Told<'_>>) -> Vec<Finding> {
     let is_payload = |one: &Told<'_>| one.series.quantity == Quantity::Payload;
     let masses: Vec<Told<'_>> = told.iter().copied().filter(is_payload).collect();
     told.retain(|one| {
         let echoes = |mass: &Told<'_>| {
-            // Wear begins by chance within a payload's days; an echo ends with it.
+            // An effect of the payload ends with it; wear that happens to begin in these days does not.
             let lasts_alike = mass.event.until.is_some() == one.event.until.is_some();
             lasts_alike && together(&mass.event, &one.event)
         };
@@ -116,7 +116,7 @@ fn payloads(told: &mut Vec<Told<'_>>) -> Vec<Finding> {
         .collect()
 }
 
-/// Takes the frictions out: one finding a joint, or one for all if most joints changed together.
+/// Moves the friction events out of `told` as findings: one per joint, or one for all joints if most changed at once.
 fn frictions(told: &mut Vec<Told<'_>>, joints: usize) -> Vec<Finding> {
     let is_friction = |one: &Told<'_>| one.series.quantity.is_friction();
     let mut frictions: Vec<Told<'_>> = told.iter().copied().filter(is_friction).collect();
@@ -127,7 +127,7 @@ fn frictions(told: &mut Vec<Told<'_>>, joints: usize) -> Vec<Finding> {
         };
         !is_friction(one) && !frictions.iter().any(beside)
     });
-    // The surest first.
+    // Smallest relative uncertainty first.
     let sureness = |one: &Told<'_>| {
         let [low, high] = one.event.interval;
         one.event.size.abs() / (high - low).max(f64::MIN_POSITIVE)
@@ -164,8 +164,8 @@ fn frictions(told: &mut Vec<Told<'_>>, joints: usize) -> Vec<Finding> {
     findings
 }
 
-/// Whether two changes of one joint's friction are one: Coulomb and viscous friction of a gear wear together, and a small
-/// drift is certain long after a large one.
+/// Whether two changes of one joint's friction are one: Coulomb and viscous friction of a gear wear together, and a
+/// small drift is detected long after a large one.
 fn is_one_change(a: &Event, b: &Event) -> bool {
     let drifts = |event: &Event| event.shape == Shape::Drift && event.until.is_none();
     let both_drift = drifts(a) && drifts(b) && a.size * b.size > 0.0;
@@ -212,8 +212,8 @@ fn finding(cause: Cause, told: &Told<'_>) -> Finding {
     finding
 }
 
-/// A change of friction that warmth explains: who does not look at it would tell the change. `slope` is that against what
-/// it goes with, and where that is centred.
+/// Returns the change of friction that the covariate explains, and that would be reported without the covariate.
+/// `slope` and `centre` are those of the series against its covariate.
 fn explained(series: &Series, warmth: &Warmth, [slope, centre]: [f64; 2]) -> Option<Finding> {
     let blind = watch(&series.estimates, series.quantity, None).events;
     let by_warmth = |event: &Event| {
@@ -248,7 +248,7 @@ fn explained(series: &Series, warmth: &Warmth, [slope, centre]: [f64; 2]) -> Opt
     Some(finding)
 }
 
-/// What the joints have in common is one finding, if most have it.
+/// Merges common changes of friction into one finding if most joints have them, and drops them otherwise.
 fn shared(mut warm: Vec<Finding>, joints: usize) -> Vec<Finding> {
     let is_common = |one: &Finding| one.cause == Cause::CommonFriction;
     let count = warm.iter().filter(|one| is_common(one)).count();
@@ -263,12 +263,12 @@ fn shared(mut warm: Vec<Finding>, joints: usize) -> Vec<Finding> {
     warm
 }
 
-/// Whether so many joints of an arm do not change by themselves.
+/// Whether `count` joints of an arm are too many for independent changes.
 fn many(count: usize, joints: usize) -> bool {
     count >= MANY_JOINTS && 2 * count >= joints
 }
 
-/// The largest of each joint.
+/// The finding with the largest relative change of each joint.
 fn one_a_joint(mut all: Vec<Finding>) -> Vec<Finding> {
     let share = |one: &Finding| (one.size / one.level).abs();
     all.sort_by(|a, b| a.joint.cmp(&b.joint).then(share(b).total_cmp(&share(a))));

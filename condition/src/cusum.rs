@@ -1,30 +1,31 @@
 //! Cumulative sums: E. S. Page, "Continuous Inspection Schemes", Biometrika 41(1/2), 1954, section 4.
 
-/// How often a series in which nothing changes is alarmed, on average, a night.
+/// Mean false alarm rate of a series without a change \[1/night\].
 ///
-/// Statistical: with 31 series a cell (six joints with five quantities, and a payload), a hundred cells and a year, this
-/// is about 0.1 false alarm: one in ten years of a hundred cells.
+/// Statistical: with 31 series per cell (six joints with five quantities, and a payload), a hundred cells and a year,
+/// this is about 0.1 false alarm: one in ten years of a hundred cells.
 pub const FALSE_ALARMS_A_NIGHT: f64 = 1e-7;
-/// What a night must exceed the expected by before it adds to the sum \[standard deviations\].
-/// Statistical: half of the smallest lasting change that is looked for, which is 1 (Page's k).
+/// Deviation that a night must exceed to add to the sum \[standard deviations\].
+/// Statistical: half of the smallest lasting change to be detected, which is 1 (Page's k).
 const ALLOWANCE: f64 = 0.5;
-/// No night adds more than one of so many deviations.
-/// Tuned: on simulated years with seeds 101 to 110, `cargo test -p tauscope-condition --test year`: with 6, a single wild
-/// night behind some chance ones was a change in two of 1,000 cell years. Five nights far off are a change, four are none.
+/// Bound to which the deviation of a night is clipped \[standard deviations\].
+/// Tuned: on simulated years with seeds 101 to 110, `cargo test -p tauscope-condition --test year`: with 6, a single
+/// outlier after a few chance deviations was a change in two of 1,000 cell years. Five nights far off are a change,
+/// four are none.
 const MOST: f64 = 4.0;
 
-/// Sums of what exceeds the expected, upwards and downwards.
+/// Cumulative sums of deviations, upwards and downwards.
 #[derive(Debug, Clone)]
 pub struct Cusum {
     limit: f64,
     sums: [f64; 2],
-    /// The first night since each sum was zero.
+    /// First night after each sum was last zero.
     begins: [Option<usize>; 2],
 }
 
 impl Default for Cusum {
     fn default() -> Self {
-        // Two sides share the false alarms.
+        // The two sides share the false alarm rate.
         Self {
             limit: decision_interval(0.5 * FALSE_ALARMS_A_NIGHT),
             sums: [0.0; 2],
@@ -34,8 +35,8 @@ impl Default for Cusum {
 }
 
 impl Cusum {
-    /// Takes a standardised deviation, which without a change is normal with variance 1; `night` is its number. The night
-    /// in which the change began, if it is certain now.
+    /// Adds the standardised deviation of a night, which is standard normal without a change; `night` is its number.
+    /// Returns the night in which the change began, if it is detected now.
     pub fn take(&mut self, deviation: f64, night: usize) -> Option<usize> {
         let deviation = deviation.clamp(-MOST, MOST);
         for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
@@ -51,7 +52,7 @@ impl Cusum {
     }
 }
 
-/// The limit of a one-sided sum that a normal variable passes at this rate: D. Siegmund, *Sequential Analysis*, 1985,
+/// Limit of a one-sided sum for this false alarm rate of a normal variable: D. Siegmund, *Sequential Analysis*, 1985,
 /// equation 2.57.
 pub fn decision_interval(rate: f64) -> f64 {
     let run_length = |limit: f64| {
@@ -77,7 +78,8 @@ mod tests {
 
     #[test]
     fn siegmund_limits_are_those_of_the_tables() {
-        // Montgomery, Introduction to Statistical Quality Control, table 9.3: k = 0.5, h = 4 and 5, two-sided 168 and 465.
+        // Montgomery, Introduction to Statistical Quality Control, table 9.3: k = 0.5, h = 4 and 5, two-sided 168 and
+        // 465.
         assert!((decision_interval(0.5 / 168.0) - 4.0).abs() < 0.05);
         assert!((decision_interval(0.5 / 465.0) - 5.0).abs() < 0.05);
     }

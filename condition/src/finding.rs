@@ -1,4 +1,4 @@
-//! What is told of an arm.
+//! Findings about an arm.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,61 +6,61 @@ use crate::forecast::Forecast;
 use crate::series::Quantity;
 use crate::shape::Shape;
 
-/// What is behind a change.
+/// Cause of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
-    /// A mass on the tool that the twin does not know of, or a lost one.
+    /// Undeclared mass on the tool, or loss of a declared one.
     Payload,
-    /// The friction of one joint grows.
+    /// Growing friction of one joint.
     Wear,
-    /// The friction of one joint has grown at once: a crash, a brake that drags.
+    /// Sudden rise of the friction of one joint: a crash, a dragging brake.
     FrictionStep,
-    /// The friction of one joint has become less: a new gear or grease, or a tooth that is gone.
+    /// Fall of the friction of one joint: a new gear or grease, or a broken tooth.
     FrictionLoss,
-    /// The friction of most joints has changed at once: warmth without a sensor, or another way of measuring.
+    /// Simultaneous change of the friction of most joints: warmth without a sensor, or another method of measurement.
     CommonFriction,
-    /// Friction follows the temperature, or the time since the start: no wear.
+    /// Friction that follows the temperature or the time since the start; no wear.
     Warmth,
-    /// A joint's effort is recorded on another scale.
+    /// Changed scale of a joint's recorded effort.
     Gain,
-    /// A joint's effort has another constant part.
+    /// Changed constant part of a joint's effort.
     Offset,
-    /// The play of a joint's gear has changed.
+    /// Changed backlash of a joint's gear.
     Backlash,
 }
 
 /// A change of an arm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
-    /// What is behind it.
+    /// Cause of the change.
     pub cause: Cause,
-    /// The joint; `None` for the whole arm.
+    /// Joint; `None` for the whole arm.
     pub joint: Option<String>,
-    /// The quantity that tells it best.
+    /// Quantity with the strongest evidence.
     pub quantity: Quantity,
     /// Step, drift or episode.
     pub shape: Shape,
-    /// When it began \[days since 1970-01-01 UTC\].
+    /// Onset \[days since 1970-01-01 UTC\].
     pub from: f64,
-    /// The night in which it was certain \[days since 1970-01-01 UTC\].
+    /// Night of the detection \[days since 1970-01-01 UTC\].
     pub told: f64,
-    /// When it was over.
+    /// End, if it is over \[days since 1970-01-01 UTC\].
     pub until: Option<f64>,
-    /// The level before.
+    /// Level before the change.
     pub level: f64,
-    /// By how much it is off that now, or was while it lasted.
+    /// Deviation from the level now, or during an episode.
     pub size: f64,
-    /// The 95 % interval of that.
+    /// 95 % interval of `size`.
     pub interval: [f64; 2],
-    /// When half as much friction again is reached.
+    /// Forecast of the time at which friction is half as much again.
     pub forecast: Option<Forecast>,
     /// The finding as a sentence.
     pub sentence: String,
 }
 
 impl Finding {
-    /// Whether somebody should look at the arm. Warmth is only explained, and so is what most joints share.
+    /// Whether the arm needs an inspection. Warmth and changes common to most joints need none.
     pub fn is_alarm(&self) -> bool {
         !matches!(self.cause, Cause::Warmth | Cause::CommonFriction)
     }

@@ -1,4 +1,4 @@
-//! When a limit is reached, as an interval of days; nothing where the slope may be zero.
+//! Forecast of the time until a limit is reached, as an interval of days; none where the slope may be zero.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,26 +6,27 @@ use crate::robust::{median, theil_sen};
 use crate::series::{Estimate, Warmth};
 use crate::watch::Event;
 
-/// The limit, over the level before the drift.
-/// Resolution: half as much friction again is what a gear is opened for; a plant sets its own by its own gears.
+/// Limit, as a multiple of the level before the drift.
+/// Resolution: gears are opened at half as much friction again; a plant sets its own limit from its own gears.
 pub const LIMIT: f64 = 1.5;
-/// Fewest nights of a drift that are extended. Resolution: ten nights' slopes have an interval of some use.
+/// Fewest nights of a drift for a forecast. Resolution: the slopes of ten nights have a useful interval.
 const LEAST_NIGHTS: usize = 10;
 
-/// When a limit is reached.
+/// Forecast of the time until a limit is reached.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Forecast {
-    /// The limit.
+    /// Limit, in the unit of the quantity.
     pub limit: f64,
-    /// In how many days it is reached, from the newest night on: 95 % interval by that of the slope.
+    /// 95 % interval of the time from the newest night to the limit, from that of the slope \[days\].
     pub days: [f64; 2],
-    /// Change a day: 95 % interval.
+    /// 95 % interval of the change per day.
     pub slope_per_day: [f64; 2],
 }
 
-/// The forecast of a drift: the median of slopes (Theil and Sen) of the estimates since it began, freed from what they go
-/// with. To the interval of the slope that of the whole fit is added, which knows how well warmth and level are known.
-/// `None` if the slope's interval covers zero, if it leads away from the limit, or if the limit is passed.
+/// Extrapolates a drift with the median of slopes (Theil and Sen) of the estimates since its onset, corrected for the
+/// covariate. The interval of the slope is combined with that of the whole fit, which includes the uncertainty of
+/// warmth and level. Returns `None` if the slope's interval covers zero, if the slope leads away from the limit, or
+/// if the limit is exceeded already.
 pub fn forecast(
     estimates: &[Estimate],
     warmth: Option<&Warmth>,

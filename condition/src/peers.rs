@@ -2,35 +2,35 @@
 
 use crate::robust::median;
 
-/// Peers from which on one can be an outlier among them.
-/// Resolution: a median of seven is moved by no three faults.
+/// Fewest peers for a test of outliers.
+/// Resolution: three faults do not move a median of seven.
 pub const LEAST_PEERS: usize = 7;
 /// Standard deviation of a normal distribution over its median absolute deviation.
 /// Physical: 1 / the normal quantile of 3/4.
 const DEVIATIONS: f64 = 1.4826;
-/// A modified z-score beyond this is an outlier among many peers.
-/// Statistical: of 3,000 numbers of a hundred healthy cells, one lies beyond it in 1 of 600 fleets.
+/// Modified z-score beyond which a value is an outlier among many peers.
+/// Statistical: of 3,000 values of a hundred healthy cells, one lies beyond it in 1 of 600 fleets.
 const OUTLIER: f64 = 5.0;
-/// Share by which the limit grows with one over the number of peers: a spread of few is itself uncertain.
+/// Coefficient of 1/n in the relative increase of that limit for n peers, because the spread of few is uncertain.
 /// Statistical: the 1 - 2.9e-7 quantile of Student's t with 0.37 n degrees (the efficiency of the median absolute
 /// deviation) over the normal one, to first order.
 const FEW: f64 = 18.0;
-/// The spread of peers counts as no less than this share of their median.
-/// Resolution: arms of one make differ by more; twins are no proof of precision.
+/// Lower bound on the spread of peers, as a share of their median.
+/// Resolution: arms of one make differ by more; a few equal values do not prove precision.
 const LEAST_SPREAD: f64 = 0.05;
 
-/// How far a value lies from its peers' median.
+/// Deviation of a value from its peers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AmongPeers {
-    /// The peers' median.
+    /// Median of the peers.
     pub median: f64,
-    /// The modified z-score.
+    /// Modified z-score.
     pub score: f64,
-    /// Whether it is an outlier.
+    /// Whether the value is an outlier.
     pub is_outlier: bool,
 }
 
-/// `value` with its error's standard deviation among the values of its peers; `None` for too few peers.
+/// Compares `value`, with the standard deviation of its error, with its peers; `None` for too few peers.
 pub fn among(value: f64, deviation: f64, peers: &[f64]) -> Option<AmongPeers> {
     let peers: Vec<f64> = peers
         .iter()
@@ -67,7 +67,7 @@ mod tests {
         assert!(!among(4.9, 0.05, &peers).unwrap().is_outlier);
         assert!(among(8.0, 0.05, &peers).unwrap().is_outlier);
         assert!(among(8.0, 0.05, &peers[..5]).is_none());
-        // What is hardly known is no outlier.
+        // A value with a large error is no outlier.
         assert!(!among(8.0, 3.0, &peers).unwrap().is_outlier);
     }
 }

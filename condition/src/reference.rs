@@ -1,39 +1,41 @@
-//! What is expected of the next night: the level of the nights before, and what the joint's temperature makes of it.
+//! Prediction of the next night: the level of the nights before, and the effect of the joint's temperature.
 //!
-//! A linear regression that takes a night at a time. Its recursive residuals are independent and have one variance while
-//! nothing changes: R. L. Brown, J. Durbin and J. M. Evans, "Techniques for Testing the Constancy of Regression
-//! Relationships over Time", JRSS B 37(2), 1975, section 2.2. A night with a temperature that was never seen has a wide
-//! expectation, so cold nights are no wear.
+//! A recursive linear regression, one night at a time. Its recursive residuals are independent and have one variance
+//! while nothing changes: R. L. Brown, J. Durbin and J. M. Evans, "Techniques for Testing the Constancy of Regression
+//! Relationships over Time", JRSS B 37(2), 1975, section 2.2. The prediction for a temperature outside the learned
+//! range has a large uncertainty, so that cold nights are not reported as wear.
 
 use crate::series::Estimate;
 
-/// What is expected, from the nights that were learned.
+/// Regression over the learned nights.
 #[derive(Debug, Clone)]
 pub struct Reference {
-    /// Centre of the covariate, for rounding.
+    /// Centre of the covariate, for numerical precision.
     centre: f64,
-    /// Information about level and slope, and its right side.
+    /// Information matrix of level and slope.
     information: [[f64; 2]; 2],
+    /// Right-hand side of the normal equations.
     right: [f64; 2],
     has_slope: bool,
-    /// Sum of squares of the standardised recursive residuals, and their number.
+    /// Sum of squares of the standardised recursive residuals.
     squares: f64,
+    /// Number of these residuals.
     count: usize,
     learned: usize,
 }
 
-/// What is expected of one night.
+/// Prediction for one night.
 #[derive(Debug, Clone, Copy)]
 pub struct Expected {
-    /// The value.
+    /// Predicted value.
     pub value: f64,
-    /// Standard deviation of the night from that, by the intervals alone.
+    /// Standard deviation of the night's value from it, from the intervals alone.
     pub deviation: f64,
 }
 
 impl Reference {
-    /// Nothing learned. `slope_deviation` is that of the slope's prior, 0 for no slope; `centre` is a covariate near those
-    /// that come.
+    /// A regression without nights. `slope_deviation` is the standard deviation of the slope's prior, 0 for no slope;
+    /// `centre` is a covariate near those that follow.
     pub fn new(slope_deviation: f64, centre: f64) -> Self {
         let mut information = [[0.0; 2]; 2];
         let has_slope = slope_deviation > 0.0;
@@ -83,7 +85,7 @@ impl Reference {
         Some([of(spread[0]), of(spread[1])])
     }
 
-    /// What is expected at a covariate of a night that is known this well.
+    /// Predicts a night with this covariate and with this standard deviation of its error.
     pub fn expects(&self, covariate: f64, deviation: f64) -> Option<Expected> {
         let spread = self.covariance()?;
         let [level, slope] = self.coefficients()?;
@@ -95,9 +97,9 @@ impl Reference {
         })
     }
 
-    /// How far a night is from what is expected, as a normal deviate: 0 where too little is known yet. The scatter of the
-    /// nights is learned with them (D. M. Hawkins, "Self-Starting Cusum Charts for Location and Scale", *The Statistician*
-    /// 36, 1987), so the deviate is exact from the first night on.
+    /// Returns the deviation of a night from its prediction as a normal deviate, 0 while too little is known. The
+    /// scatter of the nights is learned with them (D. M. Hawkins, "Self-Starting Cusum Charts for Location and
+    /// Scale", *The Statistician* 36, 1987), so the deviate is exact from the first night on.
     pub fn deviate(&self, estimate: &Estimate, covariate: f64) -> f64 {
         let Some(expected) = self.expects(covariate, estimate.deviation()) else {
             return 0.0;
@@ -109,7 +111,7 @@ impl Reference {
         normal_deviate(t, self.count as f64)
     }
 
-    /// How much more the nights scatter than their intervals say, as a factor.
+    /// Scatter of the nights, as a multiple of that given by their intervals.
     pub fn scatter(&self) -> f64 {
         if self.count == 0 {
             return 1.0;
@@ -120,7 +122,7 @@ impl Reference {
     /// Learns a night.
     pub fn learn(&mut self, estimate: &Estimate, covariate: f64) {
         let deviation = estimate.deviation();
-        // With the prior alone, the first two nights tell no scatter.
+        // The scatter follows only from more nights than coefficients.
         if self.learned > usize::from(self.has_slope)
             && let Some(expected) = self.expects(covariate, deviation)
         {
@@ -140,8 +142,9 @@ impl Reference {
     }
 }
 
-/// Student's t with `freedom` degrees as the normal deviate of the same probability: D. L. Wallace, "Bounds on Normal
-/// Approximations to Student's and the Chi-Square Distributions", *Annals of Mathematical Statistics* 30, 1959, section 2.
+/// Transforms Student's t with `freedom` degrees of freedom to the normal deviate of equal probability: D. L.
+/// Wallace, "Bounds on Normal Approximations to Student's and the Chi-Square Distributions", *Annals of Mathematical
+/// Statistics* 30, 1959, section 2.
 fn normal_deviate(t: f64, freedom: f64) -> f64 {
     let size = (freedom * (1.0 + t * t / freedom).ln()).sqrt();
     t.signum() * size * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0)

@@ -1,9 +1,9 @@
 //! Medians, and slopes as medians.
 
-/// Most pairs whose slopes are computed. Resolution: 2,000 estimates; more are thinned.
+/// Largest number of estimates whose pairwise slopes are computed. Resolution: 2,000 estimates; more are thinned.
 const MOST_ESTIMATES: usize = 2_000;
 
-/// The median; 0 of nothing.
+/// The median; 0 without values.
 pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let half = values.len() / 2;
@@ -35,7 +35,7 @@ pub fn theil_sen(points: &[(f64, f64)]) -> Option<(f64, [f64; 2])> {
         return None;
     }
     slopes.sort_by(f64::total_cmp);
-    // Kendall's statistic has this variance; its 97.5 % quantile counts slopes.
+    // The 97.5 % quantile of Kendall's statistic, as a number of slopes.
     let spread = 1.96 * (n * (n - 1.0) * (2.0 * n + 5.0) / 18.0).sqrt();
     let count = slopes.len() as f64;
     let rank = |rank: f64| slopes[(rank.max(0.0) as usize).min(slopes.len() - 1)];

@@ -1,4 +1,4 @@
-//! The series: what was estimated, night by night.
+//! Series of nightly estimates.
 
 use std::collections::BTreeMap;
 
@@ -6,22 +6,22 @@ use serde::{Deserialize, Serialize};
 
 use crate::robust::median;
 
-/// Nights that are learned before anything is told. Resolution: two weeks have every day's work twice.
+/// Nights of learning before the first report. Resolution: two weeks have every day's work twice.
 pub const LEARNED: usize = 14;
 /// Half width of a 95 % interval of a normal variable, in standard deviations.
 /// Statistical: the 97.5 % quantile of the standard normal distribution.
 const HALF_WIDTH_95: f64 = 1.96;
-/// Hours in which an arm becomes warm.
-/// Resolution: joints of arms take 0.5 to 2 hours; a covariate need only tell cold from warm.
+/// Time constant of the warm-up of an arm \[h\].
+/// Resolution: joints of arms take 0.5 to 2 hours; a covariate need only distinguish cold from warm.
 const WARM_UP_H: f64 = 1.0;
-/// A covariate is used if this share of the estimates has it.
+/// Share of the estimates that must have a covariate for it to be used.
 /// Resolution: a sensor that fails on some nights does not end its use.
 const MOST: f64 = 0.9;
-/// Other joints from which on their median is used.
+/// Fewest other joints for the use of their median.
 /// Resolution: one joint of three that wears does not move it.
 const LEAST_JOINTS: usize = 3;
 
-/// What is estimated of an arm each night.
+/// Quantity that is estimated each night.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
@@ -29,18 +29,18 @@ pub enum Quantity {
     Coulomb,
     /// Viscous friction of a joint.
     Viscous,
-    /// Recorded effort of a joint's bodies over the modelled one.
+    /// Ratio of the recorded effort of a joint's bodies to the modelled one.
     Gain,
-    /// Constant part of a joint's effort that nothing explains.
+    /// Unexplained constant part of a joint's effort.
     Offset,
-    /// Play in a joint's gear.
+    /// Backlash of a joint's gear.
     Backlash,
     /// Mass on the tool.
     Payload,
 }
 
 impl Quantity {
-    /// All of them.
+    /// All quantities.
     pub const ALL: [Self; 6] = [
         Self::Coulomb,
         Self::Viscous,
@@ -50,7 +50,7 @@ impl Quantity {
         Self::Payload,
     ];
 
-    /// The name of the number, with its unit, as terms and tables have it.
+    /// Name of the parameter with its unit, as in terms and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Coulomb => "coulomb_nm",
@@ -67,7 +67,7 @@ impl Quantity {
         Self::ALL.into_iter().find(|one| one.name() == name)
     }
 
-    /// In words.
+    /// Name in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Coulomb => "Coulomb friction",
@@ -79,7 +79,7 @@ impl Quantity {
         }
     }
 
-    /// Its unit. `effort` is that of efforts: `N m` or `A`.
+    /// Unit of the quantity. `effort` is the unit of efforts: `N m` or `A`.
     pub fn unit(self, effort: &str) -> String {
         match self {
             Self::Coulomb | Self::Offset => effort.to_owned(),
@@ -95,9 +95,9 @@ impl Quantity {
         matches!(self, Self::Coulomb | Self::Viscous)
     }
 
-    /// The smallest change that is told, at this level.
-    /// Resolution: 5 % of friction is what 5 K change on many gears, and below it no mechanic finds anything; 50 g are less
-    /// than any tool. An offset has no level of its own: what is certain is told.
+    /// Smallest change to report at this level.
+    /// Resolution: 5 K change the friction of many gears by 5 %, and below that no mechanic finds anything; 50 g are
+    /// less than any tool. An offset has no level of its own: every detected change is reported.
     pub(crate) fn relevant(self, level: f64) -> f64 {
         match self {
             Self::Coulomb | Self::Viscous => 0.05 * level.abs(),
@@ -120,30 +120,30 @@ impl Quantity {
     }
 }
 
-/// What was estimated in one night.
+/// Estimate of one night.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// When \[days since 1970-01-01 UTC\].
+    /// Time \[days since 1970-01-01 UTC\].
     pub day: f64,
-    /// The estimate.
+    /// Estimated value.
     pub value: f64,
     /// Lower end of its 95 % interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of its 95 % interval.
     pub high: f64,
-    /// Temperature of the joint then \[deg C\].
+    /// Temperature of the joint \[deg C\].
     pub temperature_c: Option<f64>,
-    /// How long the robot had been running then \[h\].
+    /// Time since the start of the robot \[h\].
     pub hours_since_start: Option<f64>,
 }
 
 impl Estimate {
-    /// Standard deviation of its error.
+    /// Standard deviation of the error.
     pub fn deviation(&self) -> f64 {
         (self.high - self.low) / (2.0 * HALF_WIDTH_95)
     }
 
-    /// Whether it can be used.
+    /// Whether the estimate is finite and has an interval.
     pub(crate) fn is_sound(&self) -> bool {
         self.day.is_finite() && self.value.is_finite() && {
             let deviation = self.deviation();
@@ -152,20 +152,20 @@ impl Estimate {
     }
 }
 
-/// What warms a joint, as far as it is known.
+/// Covariate for the warmth of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Covariate {
-    /// Its temperature \[deg C\].
+    /// Temperature of the joint \[deg C\].
     Temperature,
-    /// How cold it still is by the time since the start of the robot: exp(-t / 1 h).
+    /// Coldness by the time since the start of the robot: exp(-t / 1 h).
     TimeSinceStart,
-    /// The same quantity of the other joints, over what it was at first: all joints of an arm become warm together.
+    /// Quantity of the other joints, relative to its first nights: all joints of an arm warm up together.
     OtherJoints,
 }
 
 impl Covariate {
-    /// Its value at an estimate; `None` where the estimate alone does not tell it.
+    /// Value at an estimate; `None` if it does not follow from the estimate alone.
     pub fn of(self, estimate: &Estimate) -> Option<f64> {
         match self {
             Self::Temperature => estimate.temperature_c,
@@ -179,26 +179,26 @@ impl Covariate {
 /// One quantity of one joint, night by night.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Series {
-    /// The joint; `None` for what belongs to the whole arm.
+    /// Joint; `None` for a quantity of the whole arm.
     pub joint: Option<String>,
-    /// What was estimated.
+    /// Estimated quantity.
     pub quantity: Quantity,
-    /// The estimates, oldest first.
+    /// Estimates, the oldest first.
     pub estimates: Vec<Estimate>,
 }
 
-/// What a series goes with, estimate by estimate.
+/// Covariate of a series, by estimate.
 #[derive(Debug, Clone)]
 pub struct Warmth {
-    /// What it is.
+    /// Kind of the covariate.
     pub covariate: Covariate,
-    /// Its value at each estimate of the series, where it is known.
+    /// Value at each estimate of the series, where known.
     pub values: Vec<Option<f64>>,
 }
 
 impl Warmth {
-    /// What a series goes with: temperature where it is known, else the time since the start, else, for friction, the
-    /// other joints.
+    /// Selects the covariate of a series: the temperature if known, otherwise the time since the start, otherwise,
+    /// for friction, the other joints.
     pub fn of(series: &Series, all: &[Series]) -> Option<Self> {
         let known = |covariate: Covariate| {
             let values = series.estimates.iter().map(|one| covariate.of(one));
@@ -214,7 +214,7 @@ impl Warmth {
             .find(Self::is_known)
     }
 
-    /// Whether nearly all estimates have it, and it varies.
+    /// Whether nearly all estimates have a value, and the values vary.
     fn is_known(&self) -> bool {
         let known: Vec<f64> = self.values.iter().flatten().copied().collect();
         let first = known.first().copied().unwrap_or(0.0);
@@ -223,12 +223,12 @@ impl Warmth {
     }
 }
 
-/// The median of the other joints' friction, each over what it was in its first nights.
+/// Median of the other joints' friction, each relative to its first nights.
 fn others(series: &Series, all: &[Series]) -> Option<Warmth> {
     if !series.quantity.is_friction() {
         return None;
     }
-    // Estimates of one night have one stamp, to the minute.
+    // Estimates of one night have equal stamps, to the minute.
     let minute = |one: &Estimate| (one.day * 1440.0).round() as i64;
     let mut by_minute: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
     let is_other = |other: &&Series| {

@@ -1,60 +1,60 @@
-//! The shape of a change: a step, or a drift that goes on.
+//! The shape of a change: a step, or a continuing drift.
 //!
-//! Weighted least squares of level, covariate and the change together, over all nights at which it may have begun; the
-//! best one stands (R. E. Quandt, "The Estimation of the Parameters of a Linear Regression System Obeying Two Separate
-//! Regimes", JASA 53, 1958).
+//! Weighted least squares of level, covariate and change together, for each night at which the change may have begun;
+//! the best fit is selected (R. E. Quandt, "The Estimation of the Parameters of a Linear Regression System Obeying
+//! Two Separate Regimes", JASA 53, 1958).
 
 use serde::{Deserialize, Serialize};
 
-/// Fewest nights before and behind a place where a change may begin. Resolution: one night is an outlier.
+/// Fewest nights before and after the onset of a change. Resolution: one night is an outlier.
 const LEAST_NIGHTS: usize = 3;
 
-/// How something changes.
+/// Shape of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
-    /// At once, and it stays.
+    /// Sudden and lasting.
     Step,
-    /// More and more.
+    /// Gradual and continuing.
     Drift,
-    /// For a while.
+    /// Temporary.
     Episode,
 }
 
-/// A night as it counts here.
+/// Estimate of one night, as a data point.
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
-    /// When \[days\].
+    /// Time \[days\].
     pub day: f64,
-    /// The estimate.
+    /// Estimated value.
     pub value: f64,
     /// Standard deviation of its error.
     pub deviation: f64,
-    /// The covariate; 0 where there is none.
+    /// Covariate relative to its centre; 0 without a covariate.
     pub covariate: f64,
 }
 
-/// A change with its numbers.
+/// A change with its fitted parameters.
 #[derive(Debug, Clone, Copy)]
 pub struct Change {
     /// Step or drift.
     pub shape: Shape,
-    /// When it began \[days\].
+    /// Onset \[days\].
     pub from: f64,
-    /// The level before, at the centre of the covariate.
+    /// Level before the change, at the centre of the covariate.
     pub level: f64,
-    /// Change of the value by unit of the covariate.
+    /// Change of the value per unit of the covariate.
     pub slope: f64,
     /// Standard deviation of the level.
     pub level_deviation: f64,
-    /// By how much the newest night is off the level.
+    /// Deviation of the newest night from the level.
     pub size: f64,
-    /// Its 95 % interval.
+    /// 95 % interval of `size`.
     pub interval: [f64; 2],
 }
 
-/// The change that fits best, of those that began by the day `by`; `None` for too few nights. `has_slope`: the covariate
-/// counts.
+/// Fits the best change of those that began by the day `by`; `None` for too few nights. With `has_slope`, the fit
+/// includes the covariate.
 pub fn change(points: &[Point], has_slope: bool, by: f64) -> Option<Change> {
     let last = points.last()?.day;
     let mut best: Option<(f64, Change)> = None;
@@ -64,7 +64,7 @@ pub fn change(points: &[Point], has_slope: bool, by: f64) -> Option<Change> {
             break;
         }
         for shape in [Shape::Step, Shape::Drift] {
-            // A drift begins between two nights; the night before is its zero.
+            // A drift begins between two nights, and is zero in the first of them.
             let begin = if shape == Shape::Drift {
                 points[at - 1].day
             } else {
@@ -101,11 +101,11 @@ struct Fit {
     slope: f64,
     size: f64,
     deviation: f64,
-    /// Weighted sum of squares.
+    /// Weighted residual sum of squares.
     left: f64,
 }
 
-/// Least squares with a column beside level and covariate.
+/// Least squares of level, covariate and one more column.
 fn fit(points: &[Point], has_slope: bool, column: impl Fn(f64) -> f64) -> Option<Fit> {
     let rows = |point: &Point| {
         let covariate = if has_slope { point.covariate } else { 0.0 };
@@ -146,9 +146,9 @@ fn fit(points: &[Point], has_slope: bool, column: impl Fn(f64) -> f64) -> Option
     })
 }
 
-/// Inverse of a symmetric matrix; `None` if there is none.
+/// Inverse of a symmetric matrix; `None` for a singular one.
 fn inverse(m: [[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
-    // The remaining rows and columns, in cyclic order, so that signs come by themselves.
+    // The cyclic order of rows and columns gives each cofactor its sign.
     let cofactor = |a: usize, b: usize| {
         let ([p, q], [r, s]) = ([(a + 1) % 3, (a + 2) % 3], [(b + 1) % 3, (b + 2) % 3]);
         m[p][r] * m[q][s] - m[p][s] * m[q][r]
@@ -193,7 +193,7 @@ mod tests {
         let found = change(&drift, true, 79.0).unwrap();
         assert!(found.shape == Shape::Drift && (found.from - 40.0).abs() < 1e-9);
         assert!((found.size - 0.39).abs() < 1e-6);
-        // What comes after the change was certain does not move its beginning.
+        // A later change does not move the onset of one that was detected before it.
         let both =
             points(|day, _| 2.0 + f64::from(day >= 40.0) * 0.3 + f64::from(day >= 60.0) * 0.9);
         let found = change(&both, false, 45.0).unwrap();

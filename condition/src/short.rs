@@ -1,32 +1,32 @@
-//! A few estimates, too few to learn from: does anything change, and with what.
+//! Series too short to learn from: whether the estimates change, and with which variable.
 
 use serde::{Deserialize, Serialize};
 
 use crate::robust::median;
 use crate::series::{Covariate, Estimate};
 
-/// Fewest estimates that are compared. Resolution: a line through four leaves two to judge it by.
+/// Fewest estimates to compare. Resolution: a line through four leaves two degrees of freedom.
 pub const LEAST: usize = 5;
-/// Estimates within this share of their median are one.
-/// Resolution: what friction of a gear repeats to from one hour to the next.
+/// Deviation from the median up to which estimates are treated as equal, as a share of the median.
+/// Resolution: repeatability of a gear's friction from one hour to the next.
 const SAME: f64 = 0.02;
-/// A line must be better than another by this \[nats of the Bayesian information criterion, G. Schwarz 1978\].
+/// Evidence by which one line must exceed another \[nats of the Bayesian information criterion, G. Schwarz 1978\].
 /// Statistical: odds of 3 to 1.
 const BETTER: f64 = 1.1;
 
-/// What a few estimates say.
+/// Behaviour of a few estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SoFar {
-    /// Too few to say anything.
+    /// Too few estimates.
     TooFew,
-    /// All are one within 2 % of their median, or within their intervals.
+    /// No change: all are within 2 % of their median, or their intervals contain it.
     Stable,
-    /// They go with temperature, or with the time since the start.
+    /// Change with the temperature, or with the time since the start.
     Warmth,
-    /// They go with the date.
+    /// Change with the date.
     Trend,
-    /// They change, and nothing tells with what.
+    /// Change without an identified variable.
     Undecided,
 }
 
@@ -60,7 +60,7 @@ pub fn so_far(estimates: &[Estimate]) -> SoFar {
     let mean = sound.iter().map(|one| one.value).sum::<f64>() / sound.len() as f64;
     let flat: f64 = sound.iter().map(|one| (one.value - mean).powi(2)).sum();
     let n = sound.len() as f64;
-    // Half of n times the logarithm of what is left, and half a logarithm of n for the line's slope.
+    // Half of n times the logarithm of the ratio of residual sums, less half the logarithm of n for the slope.
     let evidence = |left: f64| 0.5 * n * (flat / left.max(1e-12 * flat)).ln() - 0.5 * n.ln();
     let date = by_date.map_or(0.0, evidence);
     let warmth = by_warmth.map_or(0.0, evidence);
@@ -73,7 +73,7 @@ pub fn so_far(estimates: &[Estimate]) -> SoFar {
     }
 }
 
-/// What a line leaves; `None` where all abscissas are one.
+/// Residual sum of squares of a line; `None` if all abscissas are equal.
 fn line(points: &[(f64, f64)]) -> Option<f64> {
     let n = points.len() as f64;
     let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;

@@ -1,4 +1,4 @@
-//! One series: when it changed, and whether that is over.
+//! Detection of changes in one series, with onset and end.
 
 use crate::cusum::Cusum;
 use crate::reference::Reference;
@@ -6,58 +6,58 @@ use crate::robust::median;
 use crate::series::{Covariate, Estimate, LEARNED, Quantity, Warmth};
 use crate::shape::{self, Point, Shape};
 
-/// A night that is further off than this is not learned \[standard deviations\].
-/// Statistical: a normal variable is so in 4 of 1e8 nights.
+/// Deviation from which on a night is an outlier and is not learned \[standard deviations\].
+/// Statistical: a normal variable exceeds it in 4 of 1e8 nights.
 const WILD: f64 = 5.5;
-/// Nights by which the newest state is judged. Resolution: a working week.
+/// Number of nights that represent the current state. Resolution: a working week.
 const NEWEST: usize = 5;
-/// A change is over when the newest nights are this near to what was expected \[standard deviations of one night\].
-/// Statistical: the mean of five nights is so in 93 % of cases where nothing is changed.
+/// Mean deviation of these nights below which a change is over \[standard deviations of one night\].
+/// Statistical: without a change, the mean of five nights is below it in 93 % of cases.
 const OVER: f64 = 0.8;
-/// The slope's prior against the time since the start, in those against a kelvin.
+/// Prior of the slope against the time since the start, relative to that against temperature \[K\].
 /// Physical: an arm warms by some 15 K.
 const KELVINS_OF_A_START: f64 = 15.0;
-/// Deviation of the slope's prior where the level says nothing, in those of one night.
+/// Lower bound on the deviation of the slope's prior, relative to that of one night \[1/K\].
 /// Statistical: two kelvins are then as much as one night's error.
 const SLOPE_OF_DEVIATION: f64 = 0.5;
 
 /// A change of one series.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// Its shape.
+    /// Shape of the change.
     pub shape: Shape,
-    /// When it began \[days since 1970-01-01 UTC\].
+    /// Onset \[days since 1970-01-01 UTC\].
     pub from: f64,
-    /// The night in which it was certain.
+    /// Night of the detection \[days since 1970-01-01 UTC\].
     pub told: f64,
-    /// When it was over.
+    /// End, if it is over \[days since 1970-01-01 UTC\].
     pub until: Option<f64>,
-    /// The level before.
+    /// Level before the change.
     pub level: f64,
     /// Standard deviation of the level.
     pub level_deviation: f64,
-    /// By how much it is off the level now, or was while it lasted.
+    /// Deviation from the level now, or during an episode.
     pub size: f64,
-    /// The 95 % interval of that.
+    /// 95 % interval of `size`.
     pub interval: [f64; 2],
-    /// Change of the value by unit of the covariate.
+    /// Change of the value per unit of the covariate.
     pub slope: f64,
-    /// Centre of the covariate: the level is that at the centre.
+    /// Centre of the covariate, to which the level refers.
     pub centre: f64,
 }
 
-/// What a series says of itself.
+/// Result of [`watch`] for one series.
 #[derive(Debug, Clone)]
 pub struct Watched {
     /// Changes, the oldest first.
     pub events: Vec<Event>,
-    /// Nights that stand alone, far from all others \[days\].
+    /// Isolated nights far from all others \[days\].
     pub outliers: Vec<f64>,
-    /// Change of the value by unit of what it goes with, and where that is centred.
+    /// Change of the value per unit of the covariate, and centre of the covariate.
     pub slope: [f64; 2],
 }
 
-/// The estimates that count, each with its covariate, and the least change that is told.
+/// Valid estimates of a series, each with its covariate, and the prior of their regression.
 struct Nights<'a> {
     all: Vec<(&'a Estimate, f64)>,
     quantity: Quantity,
@@ -81,7 +81,7 @@ impl Nights<'_> {
         reference.deviate(estimate, covariate)
     }
 
-    /// Mean of value less expectation over some nights, and the half width of its 95 % interval.
+    /// Weighted mean of value minus prediction over some nights, and the half width of its 95 % interval.
     fn mean_off(&self, reference: &Reference, nights: std::ops::Range<usize>) -> (f64, f64) {
         let (mut sum, mut weights) = (0.0, 0.0);
         for (estimate, covariate) in &self.all[nights] {
@@ -109,13 +109,13 @@ impl Nights<'_> {
     }
 }
 
-/// A change that is certain, while it lasts.
+/// A change in progress; `told` is the night in which it became large enough to be reported.
 struct Open {
     begin: usize,
     told: Option<usize>,
 }
 
-/// Looks for changes in estimates since the newest baseline, oldest first.
+/// Detects changes in the estimates since the newest baseline, the oldest first.
 pub fn watch(estimates: &[Estimate], quantity: Quantity, warmth: Option<&Warmth>) -> Watched {
     let nights = nights(estimates, quantity, warmth);
     let count = nights.all.len();
@@ -215,7 +215,7 @@ fn nights<'a>(
     }
 }
 
-/// Tells an open change as soon as it matters.
+/// Marks an open change as reported, once it is large enough.
 fn told(nights: &Nights<'_>, reference: &Reference, open: &mut Option<Open>, night: usize) {
     let Some(change) = open.as_mut().filter(|change| change.told.is_none()) else {
         return;
@@ -228,7 +228,7 @@ fn told(nights: &Nights<'_>, reference: &Reference, open: &mut Option<Open>, nig
     }
 }
 
-/// A change that is over: the nights within `during` that differ most from those around them.
+/// A change that is over: the consecutive nights within `during` that deviate most.
 fn episode(
     nights: &Nights<'_>,
     reference: &Reference,
@@ -244,7 +244,7 @@ fn episode(
         })
     };
     let offs: Vec<(f64, f64)> = during.clone().map(off).collect();
-    // What a constant over these nights explains, as a sum of squares.
+    // Selects the nights for which a constant deviation explains the largest sum of squares.
     let (mut most, mut best) = (-1.0, (0, offs.len(), 0.0, 1.0));
     for first in 0..offs.len() {
         let (mut sum, mut weights) = (0.0, 0.0);
@@ -279,7 +279,7 @@ fn episode(
     }
 }
 
-/// A change that lasts: step or drift, over the nights that were learned and those since.
+/// A lasting change: step or drift, fitted to the learned nights and those since.
 fn lasting(
     nights: &Nights<'_>,
     reference: &Reference,
@@ -290,11 +290,11 @@ fn lasting(
     let since = begin..nights.all.len();
     let points = learned.iter().copied().chain(since.clone());
     let points: Vec<Point> = points.map(|night| nights.point(night)).collect();
-    // A change has begun by the night in which it was certain; what comes later is another one.
+    // The onset is not after the detection; a later one belongs to another change.
     let told_day = nights.all[told].0.day;
     let change = shape::change(&points, nights.has_slope, told_day)?;
     let (off, half) = nights.mean_off(reference, since);
-    // Where the best shape denies the change, the sums are believed: it is a step.
+    // If the sign of the fitted change contradicts the mean deviation, the change is a step of that deviation.
     let (change_from, denied) = (change.from, change.size * off <= 0.0);
     Some(Event {
         shape: if denied { Shape::Step } else { change.shape },

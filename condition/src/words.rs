@@ -17,7 +17,7 @@ fn date(day: f64) -> String {
     )
 }
 
-/// `20 % (17 to 23 %)`, or the size with its unit where there is no level to compare with.
+/// `20 % (17 to 23 %)`, or the size with its unit where there is no level for a ratio.
 fn amount(finding: &Finding) -> String {
     let [low, high] = finding.interval.map(f64::abs);
     let (low, high) = (low.min(high), low.max(high));
@@ -84,7 +84,7 @@ pub(crate) fn sentence(finding: &Finding) -> String {
     text
 }
 
-/// The sentence of a change that most joints share.
+/// Sentence of a change common to most joints.
 pub(crate) fn common(finding: &Finding, joints: usize) -> String {
     let way = if finding.size > 0.0 { "grew" } else { "fell" };
     format!(
@@ -95,7 +95,7 @@ pub(crate) fn common(finding: &Finding, joints: usize) -> String {
     )
 }
 
-/// The sentence of warmth.
+/// Sentence of a change by warmth.
 pub(crate) fn warmth(finding: &Finding, covariate: Covariate) -> String {
     let place = finding.joint.as_deref().unwrap_or("the arm");
     let with = match covariate {

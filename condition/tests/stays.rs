@@ -1,7 +1,7 @@
-//! What was told stays told: night after night the findings are asked for anew, and a change that has been named is named
-//! until it is reversed, whatever else comes to the arm.
+//! Persistence of findings: they are computed anew each night, and a reported change is reported until it is
+//! reversed, whatever other changes follow.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -12,43 +12,44 @@ const JOINTS: usize = 6;
 const NIGHTS: usize = 240;
 /// 2026-01-01.
 const FIRST_DAY: f64 = 20_454.0;
-/// The joint that changes first, and the night in which something else comes.
+/// The joint that changes first.
 const WORN: usize = 2;
+/// Night of the second change.
 const LATER: usize = 150;
 
-/// How much more Coulomb friction the worn joint has in a night, as a share.
+/// Relative increase of the worn joint's Coulomb friction, by night.
 type More = fn(usize) -> f64;
 
-/// Grows to 47 % in 70 nights.
+/// Growth to 47 % in 70 nights.
 fn wear(night: usize) -> f64 {
     0.47 * (night.saturating_sub(60) as f64 / 70.0).min(1.0)
 }
 
-/// Grows to 47 % in the fortnight before something else comes.
+/// Growth to 47 % in the fortnight before the second change.
 fn fast_wear(night: usize) -> f64 {
     0.47 * (night.saturating_sub(LATER - 16) as f64 / 14.0).min(1.0)
 }
 
-/// Is 47 % from one night to the next.
+/// Step to 47 %.
 fn crash(night: usize) -> f64 {
     if night >= 120 { 0.47 } else { 0.0 }
 }
 
-/// The same, not a week before something else comes.
+/// Step to 47 % a week before the second change.
 fn late_crash(night: usize) -> f64 {
     if night >= LATER - 7 { 0.47 } else { 0.0 }
 }
 
-/// What comes to the arm in the night [`LATER`].
+/// The second change of the arm, in the night [`LATER`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Then {
-    /// A mass that stays. It bends gears, so that the friction of the joints that carry it is higher by this share.
+    /// Lasting payload. It loads the gears, so that the friction of the joints that carry it is higher by this share.
     Payload { kg: f64, share: f64 },
-    /// A mass for a week.
+    /// Payload for a week.
     Week { kg: f64, share: f64 },
-    /// Friction of a joint rises at once.
+    /// Sudden rise of the friction of one joint.
     Step { joint: usize, by: f64 },
-    /// All joints turn harder.
+    /// Higher friction of all joints.
     All { by: f64 },
 }
 
@@ -133,7 +134,7 @@ fn arm(seed: u64, more: More, then: Then, has_sensor: bool) -> Vec<Series> {
     all
 }
 
-/// What is told when the newest night is `night`.
+/// Findings when the newest night is `night`.
 fn told_in(all: &[Series], night: usize) -> Vec<Finding> {
     let known = all.iter().map(|one| Series {
         estimates: one.estimates[..=night].to_vec(),
@@ -142,7 +143,7 @@ fn told_in(all: &[Series], night: usize) -> Vec<Finding> {
     assess(&known.collect::<Vec<_>>(), &[])
 }
 
-/// Whether a change of the worn joint's friction is named, as one that lasts.
+/// Whether the findings have a lasting change of the worn joint's friction.
 fn names(findings: &[Finding]) -> bool {
     findings.iter().any(|one| {
         let own = one.joint.as_deref() == Some("joint3") && one.quantity.is_friction();
@@ -198,7 +199,9 @@ fn a_change_that_was_told_is_told_until_it_is_reversed_whatever_comes_later() {
                     .step_by(2)
                     .find(|night| names(&told_in(&all, *night)));
                 let Some(first) = first else {
-                    missing.push(format!("{name}, {then:?}, sensor {has_sensor}: never told"));
+                    missing.push(format!(
+                        "{name}, {then:?}, sensor {has_sensor}: never reported"
+                    ));
                     continue;
                 };
                 let is_named = |night: &usize| !names(&told_in(&all, *night));
@@ -207,7 +210,7 @@ fn a_change_that_was_told_is_told_until_it_is_reversed_whatever_comes_later() {
                     let said = told_in(&all, *to);
                     let said: Vec<&str> = said.iter().map(|one| one.sentence.as_str()).collect();
                     missing.push(format!(
-                        "{name}, {then:?}, sensor {has_sensor}: told in night {first}, not in {} from {from} to {to}: {said:?}",
+                        "{name}, {then:?}, sensor {has_sensor}: reported in night {first}, not in {} from {from} to {to}: {said:?}",
                         gone.len()
                     ));
                 }

@@ -1,10 +1,11 @@
-//! A simulated year of a hundred cells, night by night: two wear, one only warms up, one carries a payload for a week.
+//! A simulated year of a hundred cells, night by night: one wears, one crashes, one only warms up, and one carries a
+//! payload for a week.
 //!
-//! The series have the noise that the nightly estimates have (tests/year/nights.py measures it): errors of the size of
-//! the intervals, nearly normal, with some nights that are wilder. Beside that each joint follows the temperature a
-//! little, and each arm is another one.
+//! The series have the noise of the nightly estimates (measured by tests/year/nights.py): errors of the size of the
+//! intervals, nearly normal, with some outliers. In addition, each joint follows the temperature a little, and each
+//! arm has parameters of its own.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -17,23 +18,23 @@ const NIGHTS: usize = 365;
 /// 2026-01-01.
 const FIRST_DAY: f64 = 20_454.0;
 
-/// What one cell has that the others have not.
+/// Change of one cell during the year.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fate {
     Healthy,
-    /// Friction of a joint grows by so much of itself over the rest of the year.
+    /// Friction of a joint that grows by the share `by` over the rest of the year.
     Wears {
         joint: usize,
         from: usize,
         by: f64,
     },
-    /// A crash: friction of a joint is higher from that night on, and goes on growing a little.
+    /// A crash: friction of a joint that is higher from that night on.
     Crash {
         joint: usize,
         at: usize,
         by: f64,
     },
-    /// A hotter place from that night on: all joints are warmer by so many kelvins.
+    /// A hotter place from that night on: a higher temperature of all joints.
     Warms {
         at: usize,
         kelvins: f64,
@@ -48,8 +49,9 @@ enum Fate {
 struct Cell {
     random: ChaCha8Rng,
     fate: Fate,
-    /// By joint: Coulomb, viscous, their change by kelvin.
+    /// Coulomb and viscous friction, by joint.
     friction: Vec<[f64; 2]>,
+    /// Relative change of both per kelvin, by joint.
     per_kelvin: Vec<[f64; 2]>,
     has_sensor: bool,
 }
@@ -87,7 +89,7 @@ impl Cell {
     }
 
     fn error(&mut self, deviation: f64) -> f64 {
-        // One night in fifty is three times as wild as its interval says.
+        // One night in fifty has an error three times as large as its interval states.
         let wild = if self.random.random_bool(0.02) {
             3.0
         } else {
@@ -98,7 +100,7 @@ impl Cell {
 
     fn year(mut self) -> Vec<Series> {
         let mut all = Vec::new();
-        // Weather: the season, and the days that go up and down.
+        // Weather: the season, and a random variation from day to day.
         let mut weather = 0.0;
         let temperatures: Vec<f64> = (0..NIGHTS)
             .map(|night| {
@@ -161,7 +163,7 @@ impl Cell {
     ) -> Series {
         let mut estimates = Vec::new();
         for (night, temperature) in temperatures.iter().enumerate() {
-            // Some nights the cell stood.
+            // On some nights the cell was not running.
             if self.random.random_bool(0.05) {
                 continue;
             }
@@ -184,7 +186,7 @@ impl Cell {
     }
 }
 
-/// Years that are looked at.
+/// Seeds of the simulated years.
 const SEEDS: [u64; 3] = [1, 2, 3];
 
 fn fleet(seed: u64, fates: &[Fate], has_sensor: impl Fn(usize) -> bool) -> Vec<Vec<Finding>> {
@@ -262,15 +264,15 @@ fn each_fate_is_told_as_what_it_is_and_nothing_is_told_of_the_others() {
         };
         let wear = one(0, Cause::Wear, Some("joint3"));
         let night = |day: f64| day - FIRST_DAY;
-        // Of friction that is 15 % higher the detector makes no contact yet (tests/year/first_alarm.py).
+        // With 15 % more friction the detector raises no contact alarm yet (tests/year/first_alarm.py).
         let grown = 0.4 * (night(wear.told) - 90.0) / (NIGHTS as f64 - 90.0);
-        println!("seed {seed}: wear told at {:.1} %", 100.0 * grown);
-        assert!(grown < 0.15, "told in night {}", night(wear.told));
+        println!("seed {seed}: wear reported at {:.1} %", 100.0 * grown);
+        assert!(grown < 0.15, "reported in night {}", night(wear.told));
         assert!(wear.forecast.is_some(), "{wear:?}");
         let crash = one(1, Cause::FrictionStep, Some("joint5"));
         assert!((night(crash.from) - 200.0).abs() <= 2.0, "{crash:?}");
         assert!(night(crash.told) <= 206.0, "{crash:?}");
-        // Each joint that is hot by more than a tenth of its friction is warmth, and nothing else is said.
+        // Joints whose friction changes by more than a tenth are reported as warmth, and there is no other finding.
         assert!(
             !all[2].is_empty() && all[2].iter().all(|one| one.cause == Cause::Warmth),
             "{:?}",
@@ -298,7 +300,7 @@ fn a_forecast_is_an_interval_that_holds_what_comes() {
             by: 0.45,
         };
         let mut series = Cell::new(90_000 + seed, fate, true).year();
-        // What is known in night 240; half as much again is reached 132 nights after: 30 + 335 x 0.5 / 0.45 = 402.
+        // Knowledge of night 240. Half as much friction again is reached in night 30 + 335 x 0.5 / 0.45 = 402.
         for one in &mut series {
             one.estimates.retain(|one| one.day < FIRST_DAY + 240.0);
         }
@@ -324,7 +326,7 @@ fn a_maintenance_note_begins_a_new_baseline() {
     };
     let series = Cell::new(7, fate, true).year();
     assert_eq!(assess(&series, &[])[0].cause, Cause::FrictionStep);
-    // The gear was changed, and runs as it runs from then on.
+    // The gear was replaced; the friction since then is the new baseline.
     assert_eq!(assess(&series, &[FIRST_DAY + 101.0]), []);
 }
 

@@ -1,4 +1,4 @@
-//! Forward dynamics: the motion that efforts and contacts bring about.
+//! Forward dynamics: the accelerations caused by efforts and contacts.
 
 use nalgebra::{DVector, Matrix6, Vector3, Vector6};
 
@@ -9,7 +9,7 @@ use crate::kinematics::{forward_kinematics, link_jacobian};
 use crate::model::Model;
 use crate::rnea::rnea;
 
-/// What the surroundings do to a link.
+/// An external force and moment on a link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wrench {
     /// The link, an index into [`Model::links`].
@@ -20,17 +20,17 @@ pub struct Wrench {
     pub moment_nm: Vector3<f64>,
 }
 
-/// The accelerations \[rad/s² or m/s²\] that the joint efforts `effort` \[N m or N\] and the external
-/// `wrenches` bring about at `q`, `qd`, gravity and tool included: the articulated-body algorithm
-/// (RBDA section 7.3), with classical accelerations. Poses are computed on the way, so [`crate::link_pose`]
-/// and [`crate::link_jacobian`] may be asked afterwards.
+/// Computes the accelerations \[rad/s² or m/s²\] caused by the joint efforts `effort` \[N m or N\] and the external
+/// `wrenches` at `q`, `qd`, gravity and tool included: the articulated-body algorithm (RBDA section 7.3), with
+/// classical accelerations. Poses are computed as well, so [`crate::link_pose`] and [`crate::link_jacobian`] may be
+/// called afterwards.
 ///
-/// A joint that moves no inertia (a point mass on its axis) has no finite acceleration. With joints that follow others
-/// ([`Model::followers`]) the mass matrix is solved instead, and memory is allocated.
+/// A joint that moves no inertia (a point mass on its axis) has no finite acceleration. If joints follow others
+/// ([`Model::followers`]), the mass matrix is solved instead, and memory is allocated.
 ///
 /// # Panics
-/// If a slice is not one number per joint, `data` was made for a model with another number of joints,
-/// or a wrench names a link that is not there.
+/// If a slice does not have one number per joint, `data` was made for a model with another number of joints, or a
+/// wrench names a link that does not exist.
 pub fn forward_dynamics<'d>(
     model: &Model,
     data: &'d mut Data,
@@ -52,7 +52,8 @@ pub fn forward_dynamics<'d>(
     release(model, data)
 }
 
-/// By the mass matrix, as a body there is no joint's alone: M qdd = effort - bias + Jᵀ wrench (RBDA section 6.1).
+/// Solves the mass matrix, because a joint may move several bodies: M qdd = effort - bias + Jᵀ wrench (RBDA section
+/// 6.1).
 fn coupled<'d>(
     model: &Model,
     data: &'d mut Data,
@@ -73,18 +74,18 @@ fn coupled<'d>(
         Some(factored) => data
             .acceleration
             .copy_from_slice(factored.solve(&drive).as_slice()),
-        // As of a joint that moves no inertia.
+        // As for a joint that moves no inertia.
         None => data.acceleration.fill(f64::NAN),
     }
     &data.acceleration
 }
 
-/// Where a joint's axis, the body's z, stands in a spatial vector.
+/// Index of a joint's axis, the body's z, in a spatial vector.
 fn axis(prismatic: bool) -> usize {
     if prismatic { 5 } else { 2 }
 }
 
-/// Outward: velocities, and each body as if it were alone.
+/// Outward pass: velocities, and the inertia and bias force of each body alone.
 fn begin(model: &Model, data: &mut Data, qd: &[f64]) {
     let Data {
         slots, articulated, ..
@@ -137,7 +138,7 @@ fn begin(model: &Model, data: &mut Data, qd: &[f64]) {
     }
 }
 
-/// Takes an external wrench off the bias force of the body it acts on.
+/// Subtracts an external wrench from the bias force of the body it acts on.
 fn apply(model: &Model, data: &mut Data, wrench: &Wrench) {
     let frame = &model.frames[wrench.link];
     if frame.slot == 0 {
@@ -152,7 +153,7 @@ fn apply(model: &Model, data: &mut Data, wrench: &Wrench) {
     );
 }
 
-/// Inward: each body with all that hangs on it (RBDA equations 7.21 to 7.26).
+/// Inward pass: articulated inertia and bias force of each subtree (RBDA equations 7.21 to 7.26).
 fn gather(model: &Model, data: &mut Data, effort: &[f64]) {
     for (i, body) in model.bodies.iter().enumerate().rev() {
         let (done, rest) = data.articulated.split_at_mut(i + 1);
@@ -171,7 +172,7 @@ fn gather(model: &Model, data: &mut Data, effort: &[f64]) {
     }
 }
 
-/// Outward again: accelerations (RBDA equations 7.27 to 7.29).
+/// Second outward pass: accelerations (RBDA equations 7.27 to 7.29).
 fn release<'d>(model: &Model, data: &'d mut Data) -> &'d [f64] {
     let Data {
         articulated,

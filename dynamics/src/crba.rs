@@ -9,13 +9,14 @@ use crate::kinematics::forward_kinematics;
 use crate::model::Model;
 
 /// The mass matrix \[kg m², kg m, kg\] at `q`, tool included: n x n, symmetric, both triangles filled,
-/// by the composite-rigid-body algorithm (RBDA section 6.2). [`link_pose`](crate::link_pose) and
-/// [`link_jacobian`](crate::link_jacobian) answer from it too.
+/// by the composite-rigid-body algorithm (RBDA section 6.2). Poses are computed as well, see
+/// [`link_pose`](crate::link_pose) and [`link_jacobian`](crate::link_jacobian).
 ///
-/// In the world's frame, in which the inertias of a subtree add up and every axis is met by the same force.
+/// The algorithm works in the world's frame, in which the inertias of a subtree are summed and a force is the same
+/// for every axis.
 ///
 /// # Panics
-/// If `q` is not one number per joint, or `data` was made for a model with another number of joints.
+/// If `q` does not have one number per joint, or `data` was made for a model with another number of joints.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &[f64]) -> &'d DMatrix<f64> {
     check_lengths(model, data, &[q]);
     forward_kinematics(model, data, q);
@@ -42,7 +43,7 @@ pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &[f64]) -> &'d DMat
             ]),
         };
     }
-    // Joints on different branches do not feel each other.
+    // Joints on different branches are not coupled.
     let n = model.dof();
     let entries = mass_matrix.as_mut_slice();
     entries.fill(0.0);
@@ -54,7 +55,7 @@ pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &[f64]) -> &'d DMat
             first_moment,
             pseudo_inertia,
         } = slot.composite;
-        // What a unit acceleration of the joint takes; the moment is about the world's origin.
+        // Force for a unit acceleration of the joint; the moment is about the world's origin.
         let force = linear * mass + angular.cross(&first_moment);
         let moment = angular * pseudo_inertia.trace() - pseudo_inertia * angular
             + first_moment.cross(&linear);

@@ -1,12 +1,12 @@
-//! The memory the algorithms work in.
+//! Working memory of the algorithms.
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6xX, Vector3, Vector6};
 
 use crate::inertia::PARAMETERS_PER_BODY;
 use crate::model::{Body, Model};
 
-/// Working memory and results for one [`Model`] (or any other with the same tree). Each algorithm
-/// overwrites what it answers with; nothing is allocated after [`Data::new`].
+/// Working memory and results for one [`Model`] (or any other with the same tree). Each algorithm overwrites its
+/// results; nothing is allocated after [`Data::new`].
 #[derive(Debug, Clone)]
 pub struct Data {
     /// The base, then one slot per body in traversal order.
@@ -20,29 +20,29 @@ pub struct Data {
     pub(crate) jacobian: Matrix6xX<f64>,
 }
 
-/// One body's place, motion and load, in its own frame unless said otherwise.
+/// Pose, motion and load of one body, in its own frame unless stated otherwise.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Slot {
     /// Pose in the parent's frame.
     pub rotation: Matrix3<f64>,
     pub translation: Vector3<f64>,
-    /// The last angle of the joint \[rad\], with its sine and cosine: derivatives move one joint at a time.
+    /// Last angle of the joint \[rad\], with its sine and cosine: derivatives move one joint at a time, so the others
+    /// are reused.
     angle: Option<[f64; 3]>,
     /// Angular velocity and acceleration.
     pub omega: Vector3<f64>,
     pub alpha: Vector3<f64>,
-    /// \[α×\] + \[ω×\]²: takes a point of the body to its acceleration relative to the origin's.
+    /// \[α×\] + \[ω×\]²: maps a point of the body to its acceleration relative to the origin.
     pub spin: Matrix3<f64>,
     /// Acceleration of the origin, gravity included as an acceleration of the base.
     pub linear: Vector3<f64>,
-    /// What the parent must exert on this body: force, and moment about the origin.
+    /// Force and moment about the origin that the parent exerts on this body.
     pub force: Vector3<f64>,
     pub moment: Vector3<f64>,
     /// Pose in the world.
     pub world_rotation: Matrix3<f64>,
     pub world_translation: Vector3<f64>,
-    /// What the joint's unit velocity does to the world about it: angular velocity, and the velocity of what
-    /// is at the world's origin.
+    /// Angular velocity, and velocity of the point at the world's origin, for a unit velocity of the joint.
     pub angular: Vector3<f64>,
     pub linear_at_origin: Vector3<f64>,
     /// Inertia of the subtree from here on.
@@ -54,9 +54,9 @@ pub(crate) struct Slot {
 pub(crate) struct Articulated {
     pub inertia: Matrix6<f64>,
     pub bias: Vector6<f64>,
-    /// Takes the parent's acceleration to this body's frame.
+    /// Maps the parent's acceleration to this body's frame.
     pub transform: Matrix6<f64>,
-    /// The acceleration that the velocities alone bring.
+    /// Acceleration caused by the velocities alone.
     pub velocity_product: Vector6<f64>,
     /// Inertia times the joint's axis, its projection on the axis, and the joint's free effort.
     pub column: Vector6<f64>,
@@ -74,7 +74,7 @@ pub(crate) struct Composite {
 }
 
 impl Slot {
-    /// Poses the body in its parent's frame with its joint at `q` \[rad or m\].
+    /// Computes the body's pose in its parent's frame for the joint position `q` \[rad or m\].
     #[inline]
     pub fn place(&mut self, body: &Body, q: f64) {
         let q = body.ratio * q + body.offset;
@@ -124,8 +124,7 @@ impl Data {
     }
 }
 
-/// Refuses slices that are not one number per joint: the caller's mistake, like an index out of
-/// bounds.
+/// Panics if a slice does not have one number per joint: a mistake of the caller, like an index out of bounds.
 #[track_caller]
 pub(crate) fn check_lengths(model: &Model, data: &Data, slices: &[&[f64]]) {
     let n = model.dof();

@@ -9,15 +9,15 @@ use crate::lowpass::Butterworth2;
 /// divided by a jittering step, and no half sample of delay is added. A constant slope is met exactly
 /// once the filter has settled.
 ///
-/// A repeated stamp leaves the estimate as it was. A row that repeats the value before under a new
-/// stamp is taken for a standstill: a source that repeats rows must leave them out.
+/// A repeated stamp does not change the estimate. A row that repeats the previous value under a new stamp is treated
+/// as standstill, so a source must drop repeated rows.
 #[derive(Debug, Clone)]
 pub struct FilteredDerivative {
     filter: Butterworth2,
 }
 
 impl FilteredDerivative {
-    /// A derivative that sees up to about `cutoff_hz`. Until [`FilteredDerivative::reset`] its first
+    /// Creates a derivative with a bandwidth of about `cutoff_hz`. Until [`FilteredDerivative::reset`] its first
     /// sample sets its state.
     ///
     /// # Panics
@@ -28,19 +28,19 @@ impl FilteredDerivative {
         }
     }
 
-    /// Starts anew at `x`, at rest.
+    /// Restarts the filter at `x`, at rest.
     pub fn reset(&mut self, x: f64) {
         self.filter.reset(x);
     }
 
-    /// Takes `x`, `dt_s` seconds after the value before, and returns the derivative \[unit of x per
-    /// second\]. With `dt_s` not above zero the last derivative is returned.
+    /// Takes `x`, `dt_s` seconds after the previous value, and returns the derivative \[unit of x per second\]. If
+    /// `dt_s` is not positive, returns the last derivative.
     pub fn update(&mut self, dt_s: f64, x: f64) -> f64 {
         self.filter.update(dt_s, x);
         self.filter.rate()
     }
 
-    /// How long after a change of slope the estimate is within 1 % of the change \[s\].
+    /// Time after a change of slope until the estimate is within 1 % of the change \[s\].
     pub fn settling_time_s(&self) -> f64 {
         self.filter.settling_time_s()
     }

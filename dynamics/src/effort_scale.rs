@@ -1,26 +1,26 @@
-//! What unit a measured effort is in, told by its slope over the effort that the robot's motion requires.
+//! Unit of a measured effort, from its slope over the effort that the robot's motion requires.
 //!
-//! A joint that bears weight measures its torque one to one where the unit is N m. A motor current is smaller by
-//! the torque constant at the joint, which is 3 to 100 N m/A for geared arms. So the slopes of the joints that
-//! bear weight tell the unit, and a slope below zero tells a joint whose sign is turned.
+//! A joint that carries weight has a slope of 1 if the unit is N m. A motor current is smaller by the torque constant
+//! at the joint, which is 3 to 100 N m/A for geared arms. So the slopes of the joints that carry weight determine the
+//! unit, and a negative slope means a reversed sign.
 
 use std::fmt;
 
-/// A slope beyond this, either way, is a wrong unit rather than physics.
-/// Physical: a payload or wrong masses change the torque of the joints that bear weight less than threefold, and
+/// Factor from 1, in either direction, beyond which a slope means a wrong unit rather than physics.
+/// Physical: a payload or wrong masses change the torque of the joints that carry weight less than threefold, and
 /// torque constants at the joint begin at 3 N m/A.
 const WRONG_SCALE: f64 = 3.0;
-/// Within this factor of 1, either way, the unit is N m without doubt.
+/// Factor from 1, in either direction, within which the unit is certainly N m.
 /// Physical: as `WRONG_SCALE`, for an arm whose payload weighs no more than the arm.
 const SURE_SCALE: f64 = 2.0;
-/// A current of more than this for each N m is none in A.
+/// Largest measured effort per N m that may be a current in A.
 /// Physical: torque constants at the joint begin at 0.1 N m/A, of small motors without a gear.
 const TOO_MUCH_CURRENT: f64 = 30.0;
-/// A line from the modelled to the measured effort that explains at least this share of it tells a slope.
-/// Statistical: the model explains more than friction, noise and all else together.
+/// Share of the measured effort that a line over the modelled effort must explain for its slope to be used.
+/// Statistical: the model then explains more than friction, noise and everything else together.
 pub const TELLING: f64 = 0.5;
 
-/// Measured effort per modelled N m of a joint that bears weight.
+/// Measured effort per modelled N m of a joint that carries weight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slope {
     /// The joint.
@@ -29,41 +29,41 @@ pub struct Slope {
     pub slope: f64,
 }
 
-/// What the slopes of an arm tell of the unit of its effort.
+/// Result of the slopes of an arm: the unit and sign of its effort.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EffortScale {
-    /// No joint tells.
+    /// No joint has a usable slope.
     Untold,
-    /// Joints measure with the other sign than the robot's model has.
+    /// Joints measure with the opposite sign of the robot's model.
     Turned {
-        /// Which.
+        /// Names of these joints.
         joints: Vec<String>,
-        /// How many joints measure with the model's sign.
+        /// Number of joints that measure with the model's sign.
         others: usize,
     },
-    /// N m; `sure` if the slopes leave no doubt.
+    /// N m; `sure` if the slopes leave no other explanation.
     Torque {
-        /// The middle slope.
+        /// Median slope.
         slope: f64,
         /// Whether it is within a factor of two of 1.
         sure: bool,
     },
-    /// Less than a third of a N m by N m: a motor current, or a torque on the motor's side of the gear.
+    /// Less than a third of a N m per N m: a motor current, or a torque on the motor's side of the gear.
     Current {
-        /// The middle factor from the recorded unit to N m at the joint.
+        /// Median factor from the recorded unit to N m at the joint.
         nm_per_unit: f64,
-        /// How many joints tell so.
+        /// Number of joints with such a slope.
         joints: usize,
     },
-    /// More than threefold: neither N m nor A of this robot.
+    /// More than three units per N m: neither N m nor A of this robot.
     TooLarge {
-        /// The middle slope.
+        /// Median slope.
         slope: f64,
     },
 }
 
 impl EffortScale {
-    /// What `slopes` tell.
+    /// Determines the scale from `slopes`.
     pub fn of(slopes: &[Slope]) -> Self {
         let turned = slopes.iter().filter(|one| one.slope < 0.0);
         let turned: Vec<String> = turned.map(|one| one.joint.clone()).collect();
@@ -78,7 +78,7 @@ impl EffortScale {
         Self::of_positive(&all)
     }
 
-    /// The same of slopes that are known to be positive.
+    /// Determines the scale from slopes that are known to be positive.
     pub fn of_positive(slopes: &[f64]) -> Self {
         let mut known = slopes.to_vec();
         known.retain(|slope| slope.is_finite() && *slope != 0.0);
@@ -99,7 +99,7 @@ impl EffortScale {
         }
     }
 
-    /// Why an effort that is said to be in N m cannot be.
+    /// Fault if the effort is declared to be in N m; `None` if it may be.
     pub fn fault_in_nm(&self) -> Option<ScaleFault> {
         match self {
             Self::Untold | Self::Torque { .. } => None,
@@ -114,7 +114,7 @@ impl EffortScale {
         }
     }
 
-    /// Why an effort that is said to be in A cannot be.
+    /// Fault if the effort is declared to be in A; `None` if it may be.
     pub fn fault_in_a(&self) -> Option<ScaleFault> {
         match self {
             Self::Turned { joints, others } => Some(ScaleFault::Turned {
@@ -128,31 +128,31 @@ impl EffortScale {
         }
     }
 
-    /// Why an effort that is said to be in N m cannot be, told by how much it varies for each N m that the model
-    /// varies. Friction and noise only add to that.
+    /// Fault if the effort is declared to be in N m, from its variation per N m of variation of the model. Friction
+    /// and noise can only increase this ratio.
     pub fn fault_of_spread_in_nm(spread: f64) -> Option<ScaleFault> {
         (spread < 1.0 / WRONG_SCALE).then_some(ScaleFault::WrongUnit { slope: spread })
     }
 }
 
-/// Why an effort cannot be this robot's in N m.
+/// Reason why an effort cannot be this robot's in N m or A.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ScaleFault {
-    /// Efforts fall where the model's rise.
+    /// Efforts decrease while the model's increase.
     Turned {
-        /// Of which joints.
+        /// Names of these joints.
         joints: Vec<String>,
-        /// How many joints have the model's sign.
+        /// Number of joints with the model's sign.
         others: usize,
     },
-    /// The measured effort is so many times what the motion requires.
+    /// The measured effort is a multiple of the effort that the motion requires.
     WrongUnit {
-        /// The middle slope of the joints that bear weight.
+        /// Median slope of the joints that carry weight.
         slope: f64,
     },
     /// The efforts are too large for motor currents in A.
     NoCurrent {
-        /// The middle slope of the joints that bear weight \[recorded unit per N m\].
+        /// Median slope of the joints that carry weight \[recorded unit per N m\].
         slope: f64,
     },
 }
@@ -160,7 +160,7 @@ pub enum ScaleFault {
 impl fmt::Display for ScaleFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            // An axis that stands upright bears no weight, and tells by inertia.
+            // A vertical axis carries no weight; its slope comes from inertia.
             Self::Turned { joints, others } if joints.len() > others + 1 => write!(
                 f,
                 "the effort of {} has the other sign than this robot's motion requires: either the robot hangs upside down, and \

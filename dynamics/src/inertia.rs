@@ -4,11 +4,11 @@ use std::ops::{Add, AddAssign, Sub};
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-/// How many inertial parameters a rigid body has, and so columns of [`regressor`](crate::regressor) per moving body.
+/// Number of inertial parameters of a rigid body, and of columns of [`regressor`](crate::regressor) per moving body.
 pub const PARAMETERS_PER_BODY: usize = 10;
 
-/// The ten inertial parameters of a rigid body, in some frame: mass, first moment, and the second
-/// moment about the frame's origin (RBDA section 2.13). Linear: bodies that move together add up.
+/// Ten inertial parameters of a rigid body, in some frame: mass, first moment, and the second moment about the
+/// frame's origin (RBDA section 2.13). They are additive for bodies that move together.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Inertia {
     pub(crate) mass: f64,
@@ -21,7 +21,7 @@ impl Inertia {
     /// A body with the given mass \[kg\], centre of mass \[m\] and inertia about that centre along the
     /// frame's axes: xx, xy, xz, yy, yz, zz \[kg m²\].
     ///
-    /// Nothing is checked: the difference of two bodies is an inertia too.
+    /// Nothing is checked, because the difference of two bodies is an inertia too.
     pub fn new(mass_kg: f64, com_m: [f64; 3], inertia_kgm2: [f64; 6]) -> Self {
         Self::from_parts(mass_kg, com_m.into(), symmetric(inertia_kgm2))
     }
@@ -35,7 +35,7 @@ impl Inertia {
         }
     }
 
-    /// A body that is not there.
+    /// The zero inertia: no body.
     pub fn zero() -> Self {
         Self::default()
     }
@@ -84,10 +84,11 @@ impl Inertia {
         [self.mass, h.x, h.y, h.z, xx, xy, xz, yy, yz, zz]
     }
 
-    /// The body of the same mass and centre whose mass is nowhere negative: the nearest covariance of its density about its
-    /// centre, in the Frobenius norm, that has a variance of at least `least_m2` in each direction (Wensing, Kim and Slotine,
-    /// "Linear Matrix Inequalities for Physically Consistent Inertial Parameter Identification", 2018); itself if it has mass in
-    /// each as it is. Without a mass above 0, no body.
+    /// Body of the same mass and centre whose mass density is nowhere negative: the nearest covariance of its density
+    /// about its centre, in the Frobenius norm, that has a variance of at least `least_m2` in each direction
+    /// (Wensing, Kim and Slotine, "Linear Matrix Inequalities for Physically Consistent Inertial Parameter
+    /// Identification", 2018). A body that already satisfies this is returned unchanged. Without a positive mass, no
+    /// body.
     #[must_use]
     pub fn nearest_consistent(&self, least_m2: f64) -> Self {
         if self.mass <= 0.0 {
@@ -110,7 +111,7 @@ impl Inertia {
         Matrix3::identity() * (0.5 * about_com.trace()) - about_com
     }
 
-    /// The same body seen from another frame, in which this one has the given pose.
+    /// Returns the body in a frame in which this frame has the given pose.
     #[must_use]
     pub fn transformed(&self, pose: &Isometry3<f64>) -> Self {
         self.moved(
@@ -119,7 +120,7 @@ impl Inertia {
         )
     }
 
-    /// The same body seen from another frame, in which this one is rotated and then shifted by `p`.
+    /// Returns the body in a frame in which this one is rotated and then shifted by `p`.
     pub(crate) fn moved(&self, rotation: &Matrix3<f64>, p: &Vector3<f64>) -> Self {
         let h = rotation * self.first_moment;
         let (hx, px) = (h.cross_matrix(), p.cross_matrix());

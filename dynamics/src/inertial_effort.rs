@@ -1,4 +1,4 @@
-//! What accelerations cost in inertia alone, at two successive positions together.
+//! Inertial effort of accelerations, computed at two successive positions together.
 
 use std::ops::{Add, AddAssign, Mul, Sub};
 
@@ -9,9 +9,9 @@ use crate::data::check_lengths;
 use crate::model::Model;
 use crate::sines::sines;
 
-/// The product of the mass matrix and accelerations at the newest and at the previous position, without the matrix: [`rnea`](crate::rnea)
-/// without velocities and gravity (RBDA section 5.3), in body frames, whose inertias stand still. Both
-/// positions go through the recursion side by side. No allocation per call.
+/// Product of the mass matrix and accelerations at the newest and at the previous position, without forming the
+/// matrix: [`rnea`](crate::rnea) without velocities and gravity (RBDA section 5.3), in body frames, in which inertias
+/// are constant. Both positions are processed in one recursion. No allocation per call.
 #[derive(Debug, Clone)]
 pub struct InertialEffort {
     bodies: Vec<Body>,
@@ -22,17 +22,17 @@ pub struct InertialEffort {
     effort: Vec<f64>,
 }
 
-/// What a body is, in its own frame, and what it does.
+/// Constant properties of a body, in its own frame, and its present motion.
 #[derive(Debug, Clone)]
 struct Body {
     joint: usize,
-    /// Its joint's position is `ratio` times that of `joint`, and `offset`.
+    /// The position of its own joint is `ratio` times that of `joint`, plus `offset`.
     ratio: f64,
     offset: f64,
-    /// 0 is the base, i + 1 the body i.
+    /// Slot of the parent: 0 is the base, i + 1 the body i.
     parent: usize,
     prismatic: bool,
-    /// Pose in the parent's frame at position zero, row by row.
+    /// Pose in the parent's frame at position zero, in rows.
     home: [[f64; 3]; 3],
     origin: [f64; 3],
     mass: f64,
@@ -41,15 +41,15 @@ struct Body {
     /// Pose in the parent's frame.
     rotation: [Vector; 3],
     translation: Vector,
-    /// Acceleration: angular, and of the origin.
+    /// Angular acceleration, and acceleration of the origin.
     alpha: Vector,
     linear: Vector,
-    /// What the parent must exert: force, and moment about the origin.
+    /// Force and moment about the origin that the parent exerts.
     force: Vector,
     moment: Vector,
 }
 
-/// A number at the newest position and at the previous one: two lanes of the processor.
+/// A number at the newest position and at the previous one, in two SIMD lanes.
 #[derive(Debug, Clone, Copy, Default)]
 struct Pair([f64; 2]);
 
@@ -128,7 +128,7 @@ fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
 }
 
 impl InertialEffort {
-    /// For `model` with the tool it has now; both positions are zero.
+    /// Creates the recursion for `model` with its present tool; both positions are zero.
     pub fn new(model: &Model) -> Self {
         let (n, bodies) = (model.dof(), model.bodies.len());
         let body = |body: &crate::model::Body| {
@@ -165,10 +165,10 @@ impl InertialEffort {
         new
     }
 
-    /// Goes to the position `q` \[rad or m\]; what was the newest is the previous one.
+    /// Sets the position `q` \[rad or m\]; the newest position becomes the previous one.
     ///
     /// # Panics
-    /// If `q` is not one number per joint.
+    /// If `q` does not have one number per joint.
     pub fn place(&mut self, q: &[f64]) {
         for (position, body) in self.position.iter_mut().zip(&self.bodies) {
             *position = body.ratio * q[body.joint] + body.offset;
@@ -190,11 +190,11 @@ impl InertialEffort {
         }
     }
 
-    /// M(q) a + M(q') a' \[N m, N\] by joint: a = `newest` at the newest position q, a' = `previous` at the
+    /// Computes M(q) a + M(q') a' \[N m, N\] by joint: a = `newest` at the newest position q, a' = `previous` at the
     /// previous one \[rad/s², m/s²\].
     ///
     /// # Panics
-    /// If the slices are not one number per joint.
+    /// If the slices do not have one number per joint.
     pub fn sum(&mut self, newest: &[f64], previous: &[f64]) -> &[f64] {
         let Self { bodies, effort, .. } = self;
         let n = effort.len();
@@ -252,11 +252,11 @@ impl InertialEffort {
         effort
     }
 
-    /// Poses the links in `data` at the newest position, as
+    /// Computes the poses of the links in `data` at the newest position, as
     /// [`forward_kinematics`](crate::forward_kinematics) does.
     ///
     /// # Panics
-    /// If `model` or `data` is of another robot.
+    /// If `model` or `data` belongs to another robot.
     pub fn pose(&self, model: &Model, data: &mut Data) {
         check_lengths(model, data, &[&self.effort]);
         for (i, body) in self.bodies.iter().enumerate() {

@@ -1,16 +1,16 @@
-//! The arm as a tree of links and joints. Nothing here depends on the order in which the URDF names its joints.
+//! The arm as a tree of links and joints, independent of the order of the joints in the URDF.
 
 use std::collections::BTreeSet;
 
 use crate::{Data, JointKind, Model, forward_kinematics, link_pose};
 
-/// The joints that carry a link.
+/// Joints that carry a link.
 pub fn bearing(model: &Model, link: usize) -> BTreeSet<usize> {
     let links = std::iter::successors(Some(link), |&link| model.links()[link].parent);
     links.filter_map(|link| model.links()[link].joint).collect()
 }
 
-/// The link that the last joint before `link` moves: `link` itself or what it is fixed to.
+/// Link moved by the last joint before `link`: `link` itself or the link it is fixed to.
 pub fn moving_link(model: &Model, link: usize) -> usize {
     let slot = model.frames[link].slot;
     if slot == 0 {
@@ -22,8 +22,9 @@ pub fn moving_link(model: &Model, link: usize) -> usize {
     chain.last().unwrap_or(link)
 }
 
-/// How far a link's frame can be from the base link's frame \[m\]: the sum of the distances between the frames along the
-/// chain, which no revolute joint changes, and of what sliding joints add; infinite where a sliding joint has no limits.
+/// Upper bound on the distance of a link's frame from the base link's frame \[m\]: the sum of the distances between
+/// the frames along the chain, which revolute joints do not change, and of the travel of sliding joints. Infinite if
+/// a sliding joint has no limits.
 pub fn reach_m(model: &Model, link: usize) -> f64 {
     let mut data = Data::new(model);
     forward_kinematics(model, &mut data, &vec![0.0; model.dof()]);

@@ -1,4 +1,4 @@
-//! Where the links are, and how they move with the joints.
+//! Poses and Jacobians of the links.
 
 use nalgebra::{Isometry3, Matrix6xX, Rotation3, UnitQuaternion, Vector3};
 
@@ -6,11 +6,11 @@ use crate::data::Data;
 use crate::data::{Slot, check_lengths};
 use crate::model::Model;
 
-/// Computes the pose of every link at the positions `q` \[rad or m\]; [`link_pose`] and
-/// [`link_jacobian`] answer from it (RBDA section 4.4).
+/// Computes the pose of every link at the positions `q` \[rad or m\] for [`link_pose`] and [`link_jacobian`] (RBDA
+/// section 4.4).
 ///
 /// # Panics
-/// If `q` is not one number per joint, or `data` was made for a model with another number of joints.
+/// If `q` does not have one number per joint, or `data` was made for a model with another number of joints.
 pub fn forward_kinematics(model: &Model, data: &mut Data, q: &[f64]) {
     check_lengths(model, data, &[q]);
     for (i, body) in model.bodies.iter().enumerate() {
@@ -75,9 +75,9 @@ pub fn link_jacobian<'d>(model: &Model, data: &'d mut Data, link: usize) -> &'d 
     jacobian
 }
 
-/// Where the point `point_m` \[m, in the link's frame\] of a link is in the world \[m\], after
-/// [`forward_kinematics`]. `column` is given the columns of its Jacobian other than zero: joint, linear
-/// velocity of the point, angular velocity, along the world's axes.
+/// World position \[m\] of the point `point_m` \[m, in the link's frame\] of a link, after [`forward_kinematics`].
+/// `column` is called with each nonzero column of its Jacobian: joint, linear velocity of the point, angular
+/// velocity, along the world's axes.
 ///
 /// # Panics
 /// If `link` is not an index into [`Model::links`].
@@ -129,7 +129,7 @@ fn columns(
     point
 }
 
-/// What the unit velocity of a body's joint does to a point of the world: its velocity, and the angular one.
+/// Velocity of a point of the world, and angular velocity, for a unit velocity of a body's joint.
 #[inline]
 fn velocity(slot: &Slot, point: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     (

@@ -1,9 +1,8 @@
-//! The robot as mathematics: URDF, kinematics, RNEA, regressor, and the physics a rigid twin lacks.
+//! Model of the robot: URDF, kinematics, RNEA, regressor, and the physics that a rigid twin leaves out.
 //!
-//! A [`Model`] is what does not change from one call to the next, [`Data`] the memory that the
-//! algorithms work in and answer from; the algorithms are free functions over both. None of them
-//! allocates. SI units throughout; joints stand in the order of the URDF's movable joints, and the
-//! world frame is that of the URDF's root link.
+//! A [`Model`] holds the constant description of a robot, [`Data`] the working memory and results of the algorithms.
+//! The algorithms are free functions of both. None of them allocates. SI units throughout; joints are in the order of
+//! the URDF's movable joints, and the world frame is that of the URDF's root link.
 //!
 //! The algorithms follow R. Featherstone, *Rigid Body Dynamics Algorithms*, Springer 2008 ("RBDA"),
 //! written out in three dimensions.

@@ -9,13 +9,13 @@ const SETTLED: f64 = 0.01;
 /// A second-order Butterworth low-pass, `H(s) = ωc² / (s² + √2 ωc s + ωc²)` (S. Butterworth, "On the
 /// Theory of Filter Amplifiers", 1930): amplitude 1/√2 at the cutoff, poles at `ωc/√2 (-1 ± i)`.
 ///
-/// The continuous filter is solved exactly over each step for an input that runs straight from one
-/// sample to the next (first-order hold), so it needs no fixed rate, is stable at any, and stays the
-/// same filter when stamps jitter. A step of zero or less (a repeated stamp) changes nothing.
+/// The continuous filter is solved exactly over each step for an input that is linear between samples (first-order
+/// hold). So it needs no fixed rate, is stable at any rate, and remains the same filter if stamps jitter. A step of
+/// zero or less (a repeated stamp) changes nothing.
 #[derive(Debug, Clone)]
 pub struct Butterworth2 {
     cutoff_rad_s: f64,
-    /// How far the output is behind a ramp: √2 / ωc.
+    /// Delay of the output on a ramp: √2 / ωc.
     lag_s: f64,
     state: Option<State>,
     step: Step,
@@ -25,11 +25,11 @@ pub struct Butterworth2 {
 struct State {
     input: f64,
     output: f64,
-    /// The output's derivative, per second.
+    /// Derivative of the output, per second.
     rate: f64,
 }
 
-/// How a deviation from the steady course decays over a step of `dt_s`; kept, for clocks are often even.
+/// Decay of a deviation from the steady state over a step of `dt_s`; cached, because clocks are often even.
 #[derive(Debug, Clone, Copy)]
 struct Step {
     dt_s: f64,
@@ -40,12 +40,12 @@ struct Step {
 }
 
 impl Butterworth2 {
-    /// Of white noise it passes as much as an ideal low-pass at this many times its cutoff: π / (2 √2).
-    /// Statistical: the integral of |H|² over all frequencies, by the cutoff.
+    /// Noise bandwidth: white noise passes as through an ideal low-pass with this multiple of the cutoff, π / (2 √2).
+    /// Statistical: the integral of |H|² over all frequencies, divided by the cutoff.
     pub const NOISE_BANDWIDTH: f64 = PI / (2.0 * SQRT_2);
 
-    /// A filter with its -3 dB point at `cutoff_hz`. Until [`Butterworth2::reset`] its first sample
-    /// sets its state.
+    /// Creates a filter with its -3 dB point at `cutoff_hz`. Until [`Butterworth2::reset`] its first sample sets its
+    /// state.
     ///
     /// # Panics
     /// If the cutoff is not positive and finite.
@@ -67,7 +67,7 @@ impl Butterworth2 {
         }
     }
 
-    /// Starts anew, settled at `x`.
+    /// Restarts the filter, settled at `x`.
     pub fn reset(&mut self, x: f64) {
         self.state = Some(State {
             input: x,
@@ -76,8 +76,8 @@ impl Butterworth2 {
         });
     }
 
-    /// Takes the input `x`, `dt_s` seconds after the one before, and returns the output. With `dt_s`
-    /// not above zero the last output is returned and `x` passed over.
+    /// Takes the input `x`, `dt_s` seconds after the previous one, and returns the output. If `dt_s` is not positive,
+    /// `x` is ignored and the last output is returned.
     ///
     /// A `NaN` stays in the filter until [`Butterworth2::reset`].
     #[inline]
@@ -90,8 +90,8 @@ impl Butterworth2 {
         self.state.map_or(0.0, |state| state.rate)
     }
 
-    /// How long after a step the output stays within 1 % of it \[s\]: ln(√2 / 0.01) √2 / ωc, when the
-    /// decaying envelope is there.
+    /// Settling time: time after a step from which the output stays within 1 % of it \[s\], ln(√2 / 0.01) √2 / ωc,
+    /// bounded by the decaying envelope.
     pub fn settling_time_s(&self) -> f64 {
         (SQRT_2 / SETTLED).ln() * SQRT_2 / self.cutoff_rad_s
     }
@@ -120,7 +120,7 @@ impl Butterworth2 {
                 sin_over_a_s: decay * sin / a,
             };
         }
-        // On a ramp the output follows at a fixed distance; what deviates from that decays freely.
+        // On a ramp the output follows at a constant distance; a deviation from it decays freely.
         let slope = (x - before.input) / dt_s;
         let lag = slope * self.lag_s;
         let deviation = before.output - (before.input - lag);
@@ -147,13 +147,13 @@ mod tests {
 
     use super::*;
 
-    /// Of the continuous filter to a unit step at 0.
+    /// Response of the continuous filter to a unit step at 0.
     fn step_response(cutoff_hz: f64, t: f64) -> f64 {
         let at = 2.0 * PI * cutoff_hz / SQRT_2 * t;
         1.0 - (-at).exp() * (at.cos() + at.sin())
     }
 
-    /// A step as a first-order hold sees it: the input rises within a nanosecond.
+    /// A step as input of a first-order hold: the input rises within a nanosecond.
     fn stepped(cutoff_hz: f64) -> Butterworth2 {
         let mut filter = Butterworth2::new(cutoff_hz);
         filter.reset(0.0);
@@ -191,7 +191,7 @@ mod tests {
         }
     }
 
-    /// Amplitude and phase lag \[rad\] on a sine of `hz` sampled at 1 kHz, by correlation over whole periods.
+    /// Amplitude and phase lag \[rad\] for a sine of `hz` sampled at 1 kHz, by correlation over whole periods.
     fn response(cutoff_hz: f64, hz: f64) -> (f64, f64) {
         let (mut filter, dt) = (Butterworth2::new(cutoff_hz), 1e-3);
         filter.reset(0.0);

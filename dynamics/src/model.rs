@@ -23,11 +23,11 @@ pub use error::ModelError;
 pub use fix::fix_joints;
 pub use shape::{Geometry, Shape};
 
-/// Standard gravity as simulators take it \[m/s²\]; along the world's -z.
+/// Gravity \[m/s²\], along the world's -z.
 /// Physical: URDF and its simulators use 9.81 instead of the standard 9.80665.
 const GRAVITY_M_S2: f64 = 9.81;
 
-/// A robot with a fixed base. Cheap to share by reference; what changes while it runs (gravity, tool)
+/// A robot with a fixed base. Cheap to share by reference; the properties that change during a run (gravity, tool)
 /// can be set without allocation.
 #[derive(Debug, Clone)]
 pub struct Model {
@@ -49,7 +49,7 @@ pub struct Model {
 pub struct Joint {
     /// Its name, unique in the robot.
     pub name: String,
-    /// What it lets move.
+    /// Kind of its motion.
     pub kind: JointKind,
     /// The link it is mounted on, an index into [`Model::links`].
     pub parent_link: usize,
@@ -57,7 +57,7 @@ pub struct Joint {
     pub child_link: usize,
     /// Its axis in the child link's frame, of length 1.
     pub axis: [f64; 3],
-    /// Its limits as far as the URDF gives them.
+    /// Limits that the URDF gives.
     pub limits: Limits,
     /// Friction, rotor and spring that the file states.
     pub drive: Drive,
@@ -69,7 +69,7 @@ impl Joint {
         self.kind == JointKind::Prismatic
     }
 
-    /// A sentence on limits that count as none.
+    /// Sentence on limits that are treated as missing.
     pub fn remark(&self) -> Option<String> {
         let [lower, upper] = self.limits.ignored?;
         let name = &self.name;
@@ -80,21 +80,21 @@ impl Joint {
     }
 }
 
-/// A joint that has no drive of its own: by its `<mimic>` it is where another joint puts it. It is not among the
-/// [`Model::joints`]; what it carries is part of the effort of the joint that it follows.
+/// A joint without a drive of its own: by its `<mimic>` its position follows that of another joint. It is not among
+/// the [`Model::joints`]; its load is part of the effort of the joint that it follows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Follower {
     /// Its name, unique in the robot.
     pub name: String,
     /// The joint that it follows, an index into [`Model::joints`].
     pub joint: usize,
-    /// Its position is `ratio` times the position of that joint \[rad or m per rad or m\], and `offset` \[rad or m\].
+    /// Its position is `ratio` times the position of that joint \[rad or m per rad or m\], plus `offset`.
     pub ratio: f64,
-    /// See `ratio`.
+    /// Position at the zero of that joint \[rad or m\].
     pub offset: f64,
 }
 
-/// What a joint lets move.
+/// Kind of a joint's motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JointKind {
     /// Turns within limits \[rad\].
@@ -105,7 +105,7 @@ pub enum JointKind {
     Prismatic,
 }
 
-/// Limits of a joint; `None` where the URDF gives none or an infinite one.
+/// Limits of a joint; `None` if the URDF gives none or an infinite one.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Limits {
     /// Lowest position \[rad or m\].
@@ -116,22 +116,22 @@ pub struct Limits {
     pub velocity: Option<f64>,
     /// Highest effort \[N m or N\].
     pub effort: Option<f64>,
-    /// Lowest and highest position as the URDF has them, where they leave no room and count as none \[rad or m\].
+    /// Lowest and highest position in the URDF, if they leave no range and are treated as missing \[rad or m\].
     pub ignored: Option<[f64; 2]>,
 }
 
-/// A link; also those behind fixed joints.
+/// A link, including those behind fixed joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Link {
     /// Its name, unique in the robot.
     pub name: String,
-    /// Its inertia in its own frame as the URDF has it; zero where it has none.
+    /// Inertia in its own frame as in the URDF; zero if there is none.
     pub inertia: Inertia,
-    /// How to draw it, from its `<visual>` elements.
+    /// Shapes of its `<visual>` elements.
     pub shapes: Vec<Shape>,
-    /// The link it hangs on, by a movable or fixed joint; `None` for the root.
+    /// Parent link, by a movable or fixed joint; `None` for the root.
     pub parent: Option<usize>,
-    /// The nearest joint towards the base that moves it; `None` for links that stand still.
+    /// Nearest joint towards the base that moves it; `None` for fixed links.
     pub joint: Option<usize>,
 }
 
@@ -146,23 +146,24 @@ impl Link {
         self.inertia.com_m()
     }
 
-    /// How far its mass is from its centre, as the root of the mean square \[m\]; NaN without a mass.
+    /// Radius of gyration: root-mean-square distance of the mass from its centre \[m\]; NaN without a mass.
     pub fn gyration_radius_m(&self) -> f64 {
         let [xx, _, _, yy, _, zz] = self.inertia.inertia_about_com_kgm2();
         (0.5 * (xx + yy + zz) / self.mass_kg()).sqrt()
     }
 }
 
-/// A moving body: a joint's child link and all that is fixed to it. Its frame has the joint's axis as
-/// z, so that every joint costs as little as an aligned one.
+/// A moving body: a joint's child link and all links fixed to it. Its frame has the joint's axis as z, so that every
+/// joint is as cheap as an aligned one.
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
     /// The joint that moves it: index in document order.
     pub joint: usize,
-    /// Its own joint's position is `ratio` times that joint's, and `offset`: 1 and 0 but for joints that follow another.
+    /// The position of its own joint is `ratio` times that of `joint`, plus `offset`: 1 and 0 except for joints that
+    /// follow another.
     pub ratio: f64,
     pub offset: f64,
-    /// Place of its parameters in the regressor, in bodies.
+    /// Index of its block of parameters in the regressor.
     pub block: usize,
     /// Slot of the parent: 0 is the base, i + 1 the body i.
     pub parent: usize,
@@ -170,15 +171,15 @@ pub(crate) struct Body {
     /// Pose in the parent's frame at position zero.
     pub rotation: Matrix3<f64>,
     pub translation: Vector3<f64>,
-    /// Takes the child link's axes to the body's.
+    /// Rotation from the child link's axes to the body's.
     pub alignment: Matrix3<f64>,
-    /// The lumped links, and what was attached for good.
+    /// Inertia of the lumped links, and of permanently attached bodies.
     pub own: Inertia,
     pub tool: Inertia,
     pub load: Load,
 }
 
-/// A body's inertia as RNEA wants it.
+/// A body's inertia in the form that RNEA needs.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Load {
     pub mass: f64,
@@ -187,7 +188,7 @@ pub(crate) struct Load {
     pub pseudo_inertia: Matrix3<f64>,
 }
 
-/// Where a link is on the body that carries it.
+/// Pose of a link on the body that carries it.
 #[derive(Debug, Clone)]
 pub(crate) struct Frame {
     pub slot: usize,
@@ -196,7 +197,7 @@ pub(crate) struct Frame {
 }
 
 impl Body {
-    /// With the tool.
+    /// Inertia including the tool.
     pub fn inertia(&self) -> Inertia {
         self.own + self.tool
     }
@@ -215,12 +216,12 @@ impl Body {
 impl Model {
     /// Reads a URDF.
     ///
-    /// Revolute, continuous, prismatic and fixed joints in any tree; links behind fixed joints are
-    /// lumped into the body that carries them and stay as frames. Elements that do not describe
-    /// links and joints (`gazebo`, `transmission`, `ros2_control`, ...) are passed over.
+    /// Supports trees of revolute, continuous, prismatic and fixed joints. Links behind fixed joints are lumped into
+    /// the body that carries them and stay as frames. Elements that do not describe links and joints (`gazebo`,
+    /// `transmission`, `ros2_control`, ...) are ignored.
     ///
     /// # Errors
-    /// What is wrong with the text, the elements or the tree, with the element's name and line.
+    /// If the text, an element or the tree is invalid; with the element's name and line.
     pub fn from_urdf(xml: &str) -> Result<Self, ModelError> {
         tree::build(urdf::read(xml)?)
     }
@@ -261,12 +262,12 @@ impl Model {
         &self.links
     }
 
-    /// The movable joint of that name.
+    /// Index of the movable joint with this name.
     pub fn joint_index(&self, name: &str) -> Option<usize> {
         self.joints.iter().position(|joint| joint.name == name)
     }
 
-    /// The link of that name.
+    /// Index of the link with this name.
     pub fn link_index(&self, name: &str) -> Option<usize> {
         self.links.iter().position(|link| link.name == name)
     }
@@ -276,13 +277,12 @@ impl Model {
         self.gravity.into()
     }
 
-    /// Sets gravity in the world frame \[m/s²\]; for a base that hangs or leans, gravity as it sees it.
+    /// Sets gravity in the world frame \[m/s²\]; for a tilted or hanging base, gravity in the base's frame.
     pub fn set_gravity(&mut self, gravity_m_s2: [f64; 3]) {
         self.gravity = gravity_m_s2.into();
     }
 
-    /// Shifts the zero of `joint`: at the position q the robot then stands as it stood before at q + `offset`
-    /// \[rad or m\].
+    /// Shifts the zero of `joint`: the pose at the position q is then the previous pose at q + `offset` \[rad or m\].
     ///
     /// # Panics
     /// If `joint` is not an index into [`Model::joints`].
@@ -299,8 +299,8 @@ impl Model {
         }
     }
 
-    /// Makes `inertia`, in the frame of `link`, part of the robot for good, beside whatever tool is set.
-    /// On a link that stands still it changes nothing.
+    /// Adds `inertia`, in the frame of `link`, to the robot permanently, independent of the tool. On a fixed link it
+    /// has no effect.
     ///
     /// # Panics
     /// If `link` is not an index into [`Model::links`].
@@ -308,9 +308,8 @@ impl Model {
         self.change(link, |body, there| body.own += there, inertia);
     }
 
-    /// Sets the tool: `inertia` in the frame of `link` takes the place of the tool before it, on
-    /// whatever link that was. [`Inertia::zero`] takes it off. On a link that stands still it changes
-    /// nothing.
+    /// Sets the tool: `inertia` in the frame of `link` replaces the previous tool, on whichever link that was.
+    /// [`Inertia::zero`] removes it. On a fixed link it has no effect.
     ///
     /// # Panics
     /// If `link` is not an index into [`Model::links`].
@@ -321,7 +320,8 @@ impl Model {
         self.change(link, |body, there| body.tool = there, inertia);
     }
 
-    /// The same robot with nothing but `inertia`, in the frame of `link`: what it alone costs.
+    /// Returns the robot with all inertias zero except `inertia`, in the frame of `link`: gives the effort of this
+    /// body alone.
     #[must_use]
     pub fn ghost(&self, link: usize, inertia: Inertia) -> Self {
         let mut ghost = self.clone();
@@ -334,12 +334,12 @@ impl Model {
         ghost
     }
 
-    /// The ten inertial parameters of a body, tool included, in the frame of its joint's child link: the factors of the
-    /// regressor's columns, see [`crate::regressor`]. Body j is the one that joint j moves; those of
-    /// [`Model::followers`] come after them.
+    /// Ten inertial parameters of a body, tool included, in the frame of its joint's child link: the factors of the
+    /// regressor's columns, see [`crate::regressor`]. Body j is moved by joint j; those of [`Model::followers`] come
+    /// after them.
     ///
     /// # Panics
-    /// If there is no such body.
+    /// If the body does not exist.
     pub fn body_parameters(&self, body: usize) -> [f64; 10] {
         assert!(body < self.bodies.len(), "the robot has no body {body}");
         let body = self.bodies.iter().find(|other| other.block == body);

@@ -1,4 +1,4 @@
-//! Inverse dynamics as a matrix: what each inertial parameter adds to each joint's effort.
+//! Inverse dynamics as a matrix: the effort of each joint by inertial parameter.
 
 use nalgebra::{DMatrix, Matrix3, RowVector3, Vector3};
 
@@ -15,8 +15,7 @@ use crate::rnea::accelerate;
 /// Parameters of Manipulator Loads and Links", 1986; Siciliano et al., *Robotics*, 2009, section 7.2.2).
 ///
 /// # Panics
-/// If a slice is not one number per joint, or `data` was made for a model with another number of
-/// joints.
+/// If a slice does not have one number per joint, or `data` was made for a model with another number of joints.
 pub fn regressor<'d>(
     model: &Model,
     data: &'d mut Data,
@@ -36,7 +35,7 @@ pub fn regressor<'d>(
     for (i, body) in model.bodies.iter().enumerate() {
         let motion = Motion::of(body, &slots[i + 1]);
         let first = PARAMETERS_PER_BODY * body.block * n;
-        // From the child link's axes to those of the joint at hand, and where the body's origin is there.
+        // Rotation from the child link's axes to those of the current joint, and the body's origin in its frame.
         let (mut rotation, mut origin) = (body.alignment, Vector3::zeros());
         let mut at = i + 1;
         loop {
@@ -74,7 +73,7 @@ struct Motion {
     alpha: Vector3<f64>,
     /// Acceleration of the origin less gravity \[m/s²\].
     linear: Vector3<f64>,
-    /// What a place on the body is accelerated by beside `linear`, by the place \[1/s²\].
+    /// Acceleration of a point of the body relative to `linear`, by its position \[1/s²\].
     spin: Matrix3<f64>,
 }
 
@@ -89,11 +88,12 @@ impl Motion {
         }
     }
 
-    /// The power that each inertial parameter takes where the body moves with `angular` and `linear`: the body's force and
-    /// moment about its origin by each parameter, times these. A joint feels what its unit velocity takes (Jourdain).
+    /// Power of each inertial parameter if the body moves with `angular` and `linear`: the derivatives of the body's
+    /// force and moment about its origin with respect to the parameter, times these velocities. The effort of a joint
+    /// is the power for its unit velocity (Jourdain's principle).
     ///
-    /// The force is \[a, S, 0\], the moment \[0, -a×, L(α) + ω× L(ω)\], with I v = L(v) (xx, xy, xz, yy, yz, zz). A matrix
-    /// of 3 x 10 for each would have to be turned from joint to joint.
+    /// The force is \[a, S, 0\], the moment \[0, -a×, L(α) + ω× L(ω)\], with I v = L(v) (xx, xy, xz, yy, yz, zz). The
+    /// product avoids rotating a matrix of 3 x 10 from joint to joint.
     fn power(&self, angular: &Vector3<f64>, linear: &Vector3<f64>) -> [f64; PARAMETERS_PER_BODY] {
         let of_mass = self.linear.dot(linear);
         let of_first_moment = self.spin.tr_mul(linear) + self.linear.cross(angular);
@@ -116,7 +116,7 @@ impl Motion {
     }
 }
 
-/// L(v)ᵀ w: w·I v by the inertia's xx, xy, xz, yy, yz, zz.
+/// L(v)ᵀ w: derivatives of w·I v with respect to the inertia's xx, xy, xz, yy, yz, zz.
 fn inertia_power(v: &Vector3<f64>, w: &Vector3<f64>) -> [f64; 6] {
     [
         v.x * w.x,

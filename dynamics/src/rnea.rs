@@ -1,4 +1,4 @@
-//! Inverse dynamics: the effort that a motion costs.
+//! Inverse dynamics: the effort of a motion.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -6,16 +6,15 @@ use crate::data::Data;
 use crate::data::{Slot, check_lengths};
 use crate::model::Model;
 
-/// The effort \[N m or N\] that the motion `q`, `qd`, `qdd` costs at each joint, gravity and tool
-/// included: the recursive Newton-Euler algorithm (RBDA section 5.3).
+/// Computes the effort \[N m or N\] of the motion `q`, `qd`, `qdd` at each joint, gravity and tool included: the
+/// recursive Newton-Euler algorithm (RBDA section 5.3).
 ///
-/// In the form of Luh, Walker and Paul (1980) with classical accelerations in body frames. The
-/// moment comes from the pseudo-inertia ∫ r rᵀ dm instead of the inertia, so that one matrix,
-/// \[α×\] + \[ω×\]², serves a body's force, its moment and the acceleration of its children's origins.
+/// In the form of Luh, Walker and Paul (1980) with classical accelerations in body frames. The moment is computed
+/// from the pseudo-inertia ∫ r rᵀ dm instead of the inertia, so that one matrix, \[α×\] + \[ω×\]², gives a body's
+/// force, its moment and the acceleration of its children's origins.
 ///
 /// # Panics
-/// If a slice is not one number per joint, or `data` was made for a model with another number of
-/// joints.
+/// If a slice does not have one number per joint, or `data` was made for a model with another number of joints.
 pub fn rnea<'d>(
     model: &Model,
     data: &'d mut Data,
@@ -27,7 +26,7 @@ pub fn rnea<'d>(
     recursion(model, data, |j| (q[j], qd[j], qdd[j]))
 }
 
-/// The effort \[N m or N\] that holds the robot still at `q` against gravity, tool included: [`rnea`]
+/// Computes the effort \[N m or N\] that holds the robot at rest at `q` against gravity, tool included: [`rnea`]
 /// without motion.
 ///
 /// # Panics
@@ -77,7 +76,7 @@ fn recursion<'d>(
     effort
 }
 
-/// Places every body and gives it its angular velocity and its accelerations.
+/// Computes pose, angular velocity and accelerations of every body.
 #[inline]
 pub(crate) fn accelerate(
     model: &Model,
@@ -96,7 +95,7 @@ pub(crate) fn accelerate(
     }
 }
 
-/// Velocity and acceleration of a body from its parent's; the joint's axis is the body's z.
+/// Computes velocity and acceleration of a body from those of its parent; the joint's axis is the body's z.
 #[inline]
 fn follow(parent: &Slot, slot: &mut Slot, prismatic: bool, qd: f64, qdd: f64) {
     let r = &slot.rotation;

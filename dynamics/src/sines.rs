@@ -1,19 +1,19 @@
 //! Sines and cosines of many angles at once.
 
-/// 2/π, and π/2 as the sum of its first 33 bits, of which a small multiple is exact, and the rest.
+/// 2/π, and π/2 as the sum of its first 33 bits, of which a small multiple is exact, and the remainder.
 /// Physical: the digits of 2/π and π/2.
 const TWO_OVER_PI: f64 = std::f64::consts::FRAC_2_PI;
 const HALF_PI_HIGH: f64 = 1.570_796_326_734_125_6;
 const HALF_PI_LOW: f64 = 6.077_100_506_506_192e-11;
-/// Added and taken off again, it rounds to the next integer, which stands in the last bits meanwhile.
-/// Physical: 1.5 · 2⁵², from which on a double has no fraction.
+/// Constant whose addition and subtraction round to the nearest integer, which is then in the last bits of the sum.
+/// Physical: 1.5 · 2⁵², above which a double has no fraction.
 const ROUNDING: f64 = 6_755_399_441_055_744.0;
-/// Beyond this angle \[rad\] the multiple of π/2 is not exact any more.
-/// Physical: a multiple of the first 33 bits of π/2 is exact up to 2²⁰ of them; this is well below.
+/// Largest angle \[rad\] for which the multiple of π/2 is exact.
+/// Physical: a multiple of the first 33 bits of π/2 is exact up to a factor of 2²⁰; this is well below.
 const FAR: f64 = 1e5;
 
-/// Coefficients of the polynomials in r² with which FDLIBM (Sun Microsystems, 1993) has
-/// sin r = r + r³ (…) and cos r = 1 - r²/2 + r⁴ (…) on |r| ≤ π/4, highest power first.
+/// Coefficients of the polynomials in r² of FDLIBM (Sun Microsystems, 1993) for sin r = r + r³ (…) and
+/// cos r = 1 - r²/2 + r⁴ (…) on |r| ≤ π/4, highest power first.
 /// Physical: the minimax coefficients as published.
 const SINE: [f64; 6] = [
     1.589_690_995_211_55e-10,
@@ -32,11 +32,11 @@ const COSINE: [f64; 6] = [
     4.166_666_666_666_66e-2,
 ];
 
-/// Sine and cosine of each of `angles` \[rad\], to a unit or two in the last place; without a branch an
-/// angle, so that the processor takes several at once.
+/// Computes sine and cosine of each of `angles` \[rad\], accurate to one or two units in the last place; without a
+/// branch per angle, so that the processor computes several at once.
 ///
 /// # Panics
-/// If the slices are not of one length.
+/// If the slices have different lengths.
 pub(crate) fn sines(angles: &[f64], sin: &mut [f64], cos: &mut [f64]) {
     let n = angles.len();
     let (sin, cos) = (&mut sin[..n], &mut cos[..n]);
@@ -44,7 +44,7 @@ pub(crate) fn sines(angles: &[f64], sin: &mut [f64], cos: &mut [f64]) {
     for k in 0..n {
         let angle = angles[k];
         far |= angle.abs() > FAR;
-        // The reduction of Cody and Waite to |r| ≤ π/4 (FDLIBM's as well).
+        // The reduction of Cody and Waite to |r| ≤ π/4, as in FDLIBM.
         let rounded = angle * TWO_OVER_PI + ROUNDING;
         let quarters = rounded - ROUNDING;
         let r = (angle - quarters * HALF_PI_HIGH) - quarters * HALF_PI_LOW;
@@ -52,8 +52,8 @@ pub(crate) fn sines(angles: &[f64], sin: &mut [f64], cos: &mut [f64]) {
         let polynomial = |of: [f64; 6]| of.into_iter().reduce(|sum, c| sum * square + c);
         let sine = r + r * square * polynomial(SINE).unwrap_or(0.0);
         let cosine = 1.0 - 0.5 * square + square * square * polynomial(COSINE).unwrap_or(0.0);
-        // A quarter turn swaps the two; the second bit of their number is the sign of the sine, and that
-        // of the next number's the sign of the cosine.
+        // An odd number of quarter turns swaps the two. The second bit of the number is the sign of the sine, and
+        // that of the number plus one the sign of the cosine.
         let bits = rounded.to_bits();
         let swap = (bits & 1).wrapping_neg();
         let (s, c) = (sine.to_bits(), cosine.to_bits());

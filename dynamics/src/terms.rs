@@ -1,10 +1,10 @@
-//! The physics that a rigid-body twin leaves out, each term written once: the twin adds it, the
-//! simulated cell suffers it, an explanation fits it.
+//! Physics that a rigid-body twin leaves out. Each term is written once and used three times: the twin adds it, the
+//! simulated cell applies it, and an explanation fits it.
 //!
-//! A term is one file with an [`Effect`] that describes it and a [`Term`] that computes it; it is
-//! known once it stands in [`EFFECTS`]. Names and parameters are canonical: files and reports hold
-//! them. A fit does not search in the parameters but in [`Coordinate`]s in which the effort is as
-//! linear as it can be, e.g. `A sin(q - q0)` by the factors of `sin q` and `cos q`.
+//! A term is one file with an [`Effect`] that describes it and a [`Term`] that computes it; it must be listed in
+//! [`EFFECTS`]. Names and parameters are canonical: files and reports use them. A fit does not search in the
+//! parameters but in [`Coordinate`]s in which the effort is as linear as possible, e.g. `A sin(q - q0)` by the
+//! factors of `sin q` and `cos q`.
 
 mod absent_tool;
 mod asymmetric_coulomb;
@@ -106,7 +106,7 @@ pub use torque_gain::EFFECT as TORQUE_GAIN;
 pub use viscous_friction::EFFECT as VISCOUS_FRICTION;
 pub use words::Words;
 
-/// Every effect there is.
+/// All effects.
 pub static EFFECTS: &[&Effect] = &[
     &viscous_friction::EFFECT,
     &coulomb_friction::EFFECT,
@@ -165,17 +165,17 @@ pub static EFFECTS: &[&Effect] = &[
     &table::EFFECT,
 ];
 
-/// The effect of that canonical name.
+/// The effect with this canonical name.
 pub fn effect(name: &str) -> Option<&'static Effect> {
     EFFECTS.iter().copied().find(|effect| effect.name == name)
 }
 
-/// Over this speed the sign of a velocity is smoothed \[rad/s\].
+/// Speed over which the sign of a velocity is smoothed \[rad/s\].
 /// Tuned: an order below the slowest motion that is compared; not swept.
 pub const SIGN_SMOOTHING_RAD_S: f64 = 0.002;
 
-/// The sign of a velocity \[rad/s\], smooth through standstill so that it has a value at rest and a
-/// simulation can be integrated through a reversal: tanh(qd / 0.002 rad/s).
+/// Smoothed sign of a velocity \[rad/s\]: tanh(qd / 0.002 rad/s). It has a value at rest, so a simulation can be
+/// integrated through a reversal.
 #[inline]
 pub fn sign(velocity: f64) -> f64 {
     let x = velocity / SIGN_SMOOTHING_RAD_S;
@@ -183,8 +183,8 @@ pub fn sign(velocity: f64) -> f64 {
     if x.abs() > 19.1 { x.signum() } else { x.tanh() }
 }
 
-/// Where a term is: indices into the model's joints and links. What the effect's [`PlaceKind`] does not
-/// ask for is passed over.
+/// Place of a term as indices into the model's joints and links. Indices that the effect's [`PlaceKind`] does not
+/// need are ignored.
 #[derive(Debug, Clone, Copy)]
 pub struct Site<'a> {
     /// The robot.
@@ -197,10 +197,10 @@ pub struct Site<'a> {
     pub link: usize,
 }
 
-/// One instant of a motion; slices hold one number per joint in URDF order.
+/// One instant of a motion; slices hold one value per joint in URDF order.
 #[derive(Debug, Clone, Copy)]
 pub struct MotionSample<'a> {
-    /// Time since the sample before \[s\]; 0 for the first and for a repeated stamp.
+    /// Time since the previous sample \[s\]; 0 for the first and for a repeated stamp.
     pub dt_s: f64,
     /// Time since the start of the recording \[s\].
     pub recording_s: f64,
@@ -212,14 +212,14 @@ pub struct MotionSample<'a> {
     pub velocity: &'a [f64],
     /// Acceleration \[rad/s² or m/s²\].
     pub acceleration: &'a [f64],
-    /// Effort that the gears transmit, friction left out: the rigid body's with the [`Layer::Body`]
-    /// terms \[N m or N\]. For terms of that layer the rigid body's alone.
+    /// Effort that the gears transmit, without friction: that of the rigid body and the [`Layer::Body`] terms
+    /// \[N m or N\]. For terms of that layer, the effort of the rigid body alone.
     pub transmitted: &'a [f64],
 }
 
 impl MotionSample<'_> {
-    /// Share of the sample that comes after a time, 0 to 1: a sample stands for the time from half a step before it to half
-    /// a step behind it. `now_s` is its own time on the clock of `time_s`.
+    /// Share of the sample after a time, 0 to 1: a sample represents the interval from half a step before to half a
+    /// step after it. `now_s` is its own time on the clock of `time_s`.
     #[must_use]
     pub fn share_after(&self, now_s: f64, time_s: f64) -> f64 {
         let since_s = now_s - time_s;
@@ -230,59 +230,57 @@ impl MotionSample<'_> {
         (since_s / self.dt_s + 0.5).clamp(0.0, 1.0)
     }
 
-    /// A number that changes from one value to another at a time of the session \[s\].
+    /// A value that changes from `before` to `after` at a time of the session \[s\].
     #[must_use]
     pub fn stepped(&self, [before, after]: [f64; 2], time_s: f64) -> f64 {
         before + (after - before) * self.share_after(self.session_s, time_s)
     }
 }
 
-/// One piece of physics with its numbers, at one place of one robot.
+/// An effect with its parameters, at one place of one robot.
 ///
-/// What it does is told as effort of the motor: friction that holds a joint back by 4 N m costs
-/// +4 N m while the joint moves forward. The torque on the joint is the opposite.
+/// Its effort is that of the motor: friction that resists with 4 N m needs +4 N m while the joint moves forward. The
+/// torque on the joint has the opposite sign.
 pub trait Term: std::fmt::Debug + Send {
-    /// What it is.
+    /// The effect.
     fn effect(&self) -> &'static Effect;
 
     /// Its coordinates, in the effect's order.
     fn coordinates(&self) -> &[f64];
 
-    /// Forgets what came before: a new recording or a gap.
+    /// Clears the state before a new recording or after a gap.
     fn reset(&mut self) {}
 
-    /// Changes `effort` (per joint in URDF order) by what this term does at this instant, given all that
-    /// came since the last [`Term::reset`]; to be called once per sample, in order. [`Layer::Record`]
-    /// terms find the effort of all that came before them and transform it, others add to it. Does not
-    /// allocate.
+    /// Changes `effort` (per joint in URDF order) by the effort of this term at this instant. The state depends on
+    /// all samples since the last [`Term::reset`]; call once per sample, in order. [`Layer::Record`] terms receive
+    /// the effort of all preceding terms and transform it, others add to it. Does not allocate.
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]);
 
-    /// Takes what bodies cost along the motion that the following calls of [`Term::act`] go through, sample by sample
-    /// and over any [`Term::reset`]: for terms that move a link by a little, which need not ask for it then.
+    /// Supplies the expansion of the bodies' effort along the motion of the following calls of [`Term::act`], sample
+    /// by sample, across any [`Term::reset`]. Terms that deflect a link slightly then need no inverse dynamics.
     fn expand(&mut self, _along: &Arc<Expansion>) {}
 
-    /// Takes what the robot that the term was built for costs along the motion that the following calls of
-    /// [`Term::act`] go through, over any [`Term::reset`]: one effort per joint \[N m or N\] and sample, sample by sample.
-    /// For terms that compare with it, which need not compute it then.
+    /// Supplies the effort of the robot that the term was built for along the motion of the following calls of
+    /// [`Term::act`], across any [`Term::reset`]: one effort per joint \[N m or N\] and sample, sample by sample.
+    /// Terms that compare with it then need not compute it.
     fn know_recorded(&mut self, _efforts: &Arc<Vec<f64>>) {}
 
-    /// Makes the change part of the model where it is one of rigid bodies or of gravity; `false` if it
-    /// is not.
+    /// Applies the change to the model if it concerns rigid bodies or gravity; `false` otherwise.
     fn alter(&self, _model: &mut Model) -> bool {
         false
     }
 
-    /// The inertia that it adds at a link's frame for good, if that is what it is.
+    /// Inertia that the term adds permanently at a link's frame, if any.
     fn inertia(&self) -> Option<(usize, Inertia)> {
         None
     }
 
-    /// The inertia that it adds at a link's frame at this instant, for good or for a while, if that is what it is.
+    /// Inertia that the term adds at a link's frame at this instant, permanently or temporarily, if any.
     fn inertia_at(&self, _at: &MotionSample<'_>) -> Option<(usize, Inertia)> {
         self.inertia()
     }
 
-    /// The curve of an `unknown` effect: all there is to it.
+    /// The curve of an `unknown` effect, which has no other parameters.
     fn table(&self) -> Option<&Table> {
         None
     }

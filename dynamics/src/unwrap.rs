@@ -1,15 +1,16 @@
-//! Positions of joints that turn on and on, where the driver takes off whole turns.
+//! Positions of joints that turn without limits, unwrapped where the driver subtracts whole turns.
 
 use std::f64::consts::TAU;
 
-/// A longer time between two positions says nothing of what happened meanwhile \[ns\].
-/// Physical: a joint at 3 rad/s turns by less than [`SMALL_RAD`] in it.
+/// Longest time between two positions over which a turn is unwrapped \[ns\].
+/// Physical: a joint at 3 rad/s turns by less than [`SMALL_RAD`] in this time.
 const LONGEST_NS: i64 = 250_000_000;
-/// The step before a wrap, and what a wrap leaves once the whole turn is taken off, are smaller \[rad\].
-/// Physical: most arms turn no joint faster than 3 rad/s. Degrees taken for radians step by more before they step by 6.28.
+/// Upper bound on the step before a wrap, and on the step of a wrap after the whole turn is subtracted \[rad\].
+/// Physical: most arms turn no joint faster than 3 rad/s. Degrees read as radians step by more than this before they
+/// step by 6.28.
 const SMALL_RAD: f64 = 0.75;
 
-/// Follows one joint: where its position steps by a whole turn, the joint has gone on and the driver has wrapped it.
+/// Unwraps the position of one joint: a step by a whole turn is the driver's wrap, not a motion.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Unwrap {
     last: Option<(i64, f64)>,
@@ -18,8 +19,8 @@ pub struct Unwrap {
 }
 
 impl Unwrap {
-    /// The position \[rad\] as if nothing had been wrapped since the first one. Over a gap the whole turns stay what they
-    /// were; a position in m never steps like this.
+    /// Returns the position \[rad\] without the wraps since the first one. Over a gap the number of whole turns stays
+    /// the same; a position in m never steps like this.
     pub fn next(&mut self, stamp_ns: i64, position: f64) -> f64 {
         let before = self.last.replace((stamp_ns, position));
         let before = before.filter(|(at, _)| stamp_ns.saturating_sub(*at) <= LONGEST_NS);
@@ -69,7 +70,7 @@ mod tests {
         assert_eq!(unwrapped(jump.into_iter(), 10), jump);
         let gap = [0.1, 6.2, 6.21];
         assert_eq!(unwrapped(gap.into_iter(), 300), gap);
-        // 63 degrees a second at 10 Hz, up from standstill.
+        // 63 degrees per second at 10 Hz, starting from rest.
         let degrees = [0.0, 1.5, 4.5, 10.8, 17.1, 23.4];
         assert_eq!(unwrapped(degrees.into_iter(), 100), degrees);
     }

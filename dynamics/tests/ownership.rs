@@ -1,13 +1,13 @@
-//! What is known of an effect stands in its own file: no other code asks for an effect by its name.
+//! All properties of an effect are defined in its own file: no other code uses the name of an effect.
 
 use std::path::{Path, PathBuf};
 
 use tauscope_dynamics::terms::EFFECTS;
 
-/// Where the code is that must not.
+/// Folders whose code must not use the names.
 const ROOMS: [&str; 4] = ["src", "stages", "evaluate", "pipeline"];
 
-/// Lines in which such a word means something else.
+/// Lines in which such a word has another meaning.
 const OTHER_MEANINGS: [&str; 1] = ["Verdict::UnknownRemains"];
 
 fn sources(folder: &Path, into: &mut Vec<PathBuf>) {
@@ -24,7 +24,7 @@ fn sources(folder: &Path, into: &mut Vec<PathBuf>) {
     }
 }
 
-/// The lines of a file up to its tests, comments left out.
+/// Code lines of a file up to its tests, without comments.
 fn code(text: &str) -> impl Iterator<Item = &str> {
     let tests = text
         .match_indices("#[cfg(test)]")

@@ -1,4 +1,4 @@
-//! What must hold for every robot.
+//! Properties that hold for every robot.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -233,7 +233,7 @@ fn tool_effort(
     jacobian.transpose() * rate
 }
 
-/// The same robot, in which no joint follows another.
+/// The robot with its followers as independent joints.
 fn without_mimics(xml: &str) -> String {
     let mut parts = xml.split("<mimic ");
     let first = parts.next().unwrap().to_owned();
@@ -243,7 +243,7 @@ fn without_mimics(xml: &str) -> String {
             .collect::<String>()
 }
 
-/// The same robot with its elements in the opposite order.
+/// The robot with its elements in the opposite order.
 fn with_parts_reversed(xml: &str) -> String {
     let document = xml
         .replace("<joint", "\u{1}<joint")

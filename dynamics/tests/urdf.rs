@@ -1,4 +1,4 @@
-//! What is read from a URDF, and what is refused with which words.
+//! Parsing of URDFs, and the messages for invalid ones.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(clippy::float_cmp, reason = "numbers are read as they are written")]
@@ -11,7 +11,7 @@ use tauscope_dynamics::{
 const INERTIAL: &str = "<inertial><origin xyz='0 0 0.1'/><mass value='2'/>\
     <inertia ixx='0.1' ixy='0' ixz='0' iyy='0.1' iyz='0' izz='0.1'/></inertial>";
 
-/// Two arms on a column, with everything that is to be read or passed over.
+/// Two arms on a column, with all elements that are read or ignored.
 fn robot() -> String {
     format!(
         r#"<?xml version="1.0"?>
@@ -193,7 +193,7 @@ fn what_is_no_urdf_is_told_apart() {
         refusal("<robot name='r'>\n  <link name='a'>\n</robot>"),
         "not well-formed XML at line 3, column 1: expected 'link' tag, not 'robot' at 3:1"
     );
-    // A file that was not copied to its end.
+    // A file that was copied incompletely.
     assert_eq!(
         refusal("<robot name='r'>\n  <link name='a"),
         "not well-formed XML at line 2, column 16: the file ends in the middle of it"
@@ -360,7 +360,7 @@ fn a_joint_that_mimics_another_is_none_of_its_own_and_goes_where_that_puts_it() 
     };
     assert_eq!(model.dof(), 2);
     assert_eq!(model.followers(), [follower]);
-    // Another zero of the joint that it follows moves both.
+    // Shifting the zero of the joint that it follows moves both.
     let moved = pose_of(&model, "right", &[0.3, 0.4]);
     model.shift_zero(0, 0.25);
     let shifted = pose_of(&model, "right", &[0.05, 0.4]);

@@ -1,7 +1,7 @@
-//! Readings that no arm makes: an effort that jumps away for a sample or two and is back again.
+//! Corrupt readings: an effort that jumps for one or two samples and returns, as no arm can move.
 //!
-//! A single one in a training recording would teach a detector that such residuals are usual, and one in a validation recording would lift
-//! every threshold of mean and standard deviation out of reach.
+//! A single one in a training recording would teach a detector that such residuals are normal. One in a validation
+//! recording would raise every threshold of mean and standard deviation beyond any real contact.
 
 use tauscope_bus::TwinState;
 use tauscope_detect::{ContactKind, LabelledContact, Lesson};
@@ -11,22 +11,22 @@ use tauscope_pipeline::cell::CellFacts;
 use crate::metrics::statistics::quantile;
 use crate::twin::is_free_of;
 
-/// A bad reading stands out by so many times what all but one in a hundred samples differ at most from the middle of their neighbours.
+/// Ratio of a bad reading's jump to the 99 % quantile of the deviation of a sample from the mean of its neighbours.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const STANDS_OUT: f64 = 20.0;
-/// So many samples tell what is usual.
+/// Smallest number of samples from which the normal deviation is estimated.
 /// Statistical: the 99 % quantile needs a hundred samples.
 const ENOUGH: usize = 100;
 
-/// One of them.
+/// A bad reading of one joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct BadReading {
-    /// Of the sample.
+    /// Index of the sample.
     index: usize,
     joint: usize,
 }
 
-/// By how much the values from `at` to `to` lie on one side of both their neighbours.
+/// Smallest distance of the values from `at` to `to` from both neighbours, if all lie on the same side; otherwise 0.
 fn departure(residual: &[f64], at: usize, to: usize) -> f64 {
     let (before, after) = (residual[at - 1], residual[to + 1]);
     let sides = residual[at..=to]
@@ -54,7 +54,7 @@ fn find(lesson: &Lesson, joints: usize) -> Vec<BadReading> {
         usual.sort_by(f64::total_cmp);
         let bound = STANDS_OUT * quantile(&usual, 0.99);
         if bound <= 0.0 {
-            // Most samples repeat the one before: nothing tells what is usual.
+            // Most samples repeat the previous one, so the normal deviation cannot be estimated.
             continue;
         }
         for (at, sample) in samples.iter().enumerate().skip(1).take(samples.len() - 3) {
@@ -72,7 +72,7 @@ fn find(lesson: &Lesson, joints: usize) -> Vec<BadReading> {
     found
 }
 
-/// Leaves bad readings, and what the filters make of them, out of what `lesson` teaches; says so, with the first of them.
+/// Excludes bad readings, and the filters' response to them, from `lesson`. Returns a note that names the first.
 pub fn leave_out(lesson: &mut Lesson, facts: &CellFacts) -> Option<String> {
     let found = find(lesson, facts.joint_names.len());
     let first = found.first()?;
@@ -80,7 +80,7 @@ pub fn leave_out(lesson: &mut Lesson, facts: &CellFacts) -> Option<String> {
     let begin_ns = lesson.samples[0].header.stamp_ns;
     let at_s = (sample.header.stamp_ns - begin_ns) as f64 * 1e-9;
     let note = format!(
-        "{}: {} that jumped away and back as no arm does, the first at {} ({:.3} {} at {at_s:.3} s): left out of what is learnt and of thresholds",
+        "{}: {} that jumped for one or two samples as no arm can, the first at {} ({:.3} {} at {at_s:.3} s): excluded from learning and from thresholds",
         lesson.name,
         counted(found.len(), "reading"),
         facts.joint_names[first.joint],
@@ -88,7 +88,7 @@ pub fn leave_out(lesson: &mut Lesson, facts: &CellFacts) -> Option<String> {
         facts.effort_unit.as_str(),
     );
     let contacts = lesson.contacts.get_or_insert_default();
-    // Learners pass over what somebody labelled and told them to ignore, and over what follows it.
+    // Detectors do not learn from a label that is marked `ignore`, nor from the time just after it.
     contacts.extend(found.iter().map(|bad| {
         let stamp_ns = lesson.samples[bad.index].header.stamp_ns;
         LabelledContact {
@@ -108,7 +108,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use tauscope_pipeline::cell::EffortUnit;
 
-    /// A residual that wanders, with noise, and `also` at a sample.
+    /// A slowly varying residual with noise, plus `also` at each sample.
     fn lesson(also: impl Fn(usize) -> f64) -> Lesson {
         let mut random = ChaCha8Rng::seed_from_u64(7);
         let sample = |k: usize| {
@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn what_an_arm_does_is_no_bad_reading() {
-        // Nothing; friction that turns round and stays; a push of a twentieth of a second.
+        // Nothing; a friction reversal that persists; a push of 50 ms.
         assert!(left_out(&mut lesson(|_| 0.0)).is_empty());
         assert!(left_out(&mut lesson(|k| if k > 500 { 9.0 } else { 0.0 })).is_empty());
         assert!(

@@ -1,28 +1,28 @@
-//! Why an evaluation gives nothing.
+//! Errors of an evaluation.
 
 use tauscope_detect::LearnError;
 use tauscope_pipeline::build::BuildError;
 use tauscope_pipeline::calibrate::CalibrateError;
 use tauscope_pipeline::replay::ReplayError;
 
-/// Why an evaluation gives nothing.
+/// Error that ends an evaluation.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluateError {
-    /// A recording cannot be run through the stages.
+    /// A recording that the stages cannot process.
     #[error("{recording}: {source}")]
     Recording {
         /// The recording.
         recording: String,
-        /// Why.
+        /// The cause.
         source: ReplayError,
     },
-    /// The twin cannot be calibrated.
+    /// A failed calibration of the twin.
     #[error(transparent)]
     Calibrate(#[from] CalibrateError),
-    /// A stage cannot be built.
+    /// A stage that cannot be built.
     #[error(transparent)]
     Build(#[from] BuildError),
-    /// No recordings to fit the twin on.
+    /// A set without recordings for the fit of the twin.
     #[error(
         "twin `{twin}` is fitted on contact-free recordings, and the set names none under `train`; use --twin rigid, or a twin.yaml"
     )]
@@ -30,7 +30,7 @@ pub enum EvaluateError {
         /// The twin.
         twin: String,
     },
-    /// A recording of motion alone.
+    /// A recording without efforts.
     #[error(
         "{recording}: no joint state holds efforts, and without them there is nothing to detect; leave it out of the set, or record it with efforts"
     )]
@@ -38,26 +38,26 @@ pub enum EvaluateError {
         /// The recording.
         recording: String,
     },
-    /// Every sample is in a contact, or before the filters have settled.
+    /// No contact-free sample for which the filters have settled.
     #[error(
         "no threshold can be set: the validation recordings (without them the train recordings) hold no contact-free sample for which the twin's filters have settled"
     )]
     NothingFree,
-    /// A detector cannot learn from this set.
+    /// A detector that cannot learn from this set.
     #[error("{source}")]
     Learn {
         /// The detector.
         detector: &'static str,
-        /// Why.
+        /// The cause.
         source: LearnError,
     },
-    /// Every detector was left out.
+    /// No detector that can learn from this set.
     #[error("no detector can learn from this set: {why}")]
     NoDetector {
-        /// What each said.
+        /// The reason given by each detector.
         why: String,
     },
-    /// A detector says nothing.
+    /// A detector that was never ready.
     #[error(
         "{detector} was not ready at any sample of the recordings that its threshold is set on"
     )]
@@ -68,7 +68,7 @@ pub enum EvaluateError {
 }
 
 impl EvaluateError {
-    /// Whether the arguments or files are wrong (exit code 2), rather than what happened since.
+    /// Whether the error is in the arguments or input files (exit code 2).
     pub fn is_input(&self) -> bool {
         match self {
             Self::Recording { source, .. } => source.is_input(),

@@ -1,4 +1,4 @@
-//! The course of an evaluation: twins, detectors that learn, recordings that they judge.
+//! Sequence of an evaluation: prepare the twins, train the detectors, judge the recordings.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -20,25 +20,25 @@ use crate::{bad_readings, session};
 
 /// A detector behind a twin, with each of its seeds.
 pub struct Run {
-    /// The twin, a place in [`Evaluation::twins`].
+    /// Index of the twin in [`Evaluation::twins`].
     pub twin: usize,
-    /// One per seed; a detector without chance has one.
+    /// The trained detectors, one per seed; a single one if training is deterministic.
     pub seeds: Vec<Runner>,
 }
 
-/// What came of it all.
+/// Result of an evaluation.
 pub struct Evaluation {
-    /// What was asked for.
+    /// The request.
     pub request: Request,
     /// The twins.
     pub twins: Vec<Prepared>,
-    /// By twin and detector.
+    /// Trained detectors, ordered by twin and detector.
     pub runs: Vec<Run>,
-    /// Samples that were lost or refused.
+    /// Number of samples that were lost or refused.
     pub lost: u64,
     /// Findings about the recordings, a sentence each.
     pub findings: Vec<String>,
-    /// What the reader should know.
+    /// Remarks for the reader of the results.
     pub notes: Vec<String>,
 }
 
@@ -49,14 +49,14 @@ impl Evaluation {
     }
 }
 
-/// How far it is, 0 to 1, and what it does.
+/// Progress callback: completed fraction, 0 to 1, and current activity.
 pub type Progress<'a> = dyn Fn(f64, &str) + Sync + 'a;
 
-/// Evaluates. Trained weights go to `out`.
+/// Runs the evaluation. Trained weights are written to `out`.
 ///
 /// # Errors
-/// If nothing can be learnt or read. A detector that nobody asked for by name and that cannot learn from
-/// this set is left out and noted instead.
+/// If a recording cannot be read or a detector that was named cannot learn. A detector that was not named and cannot
+/// learn from this set is left out and noted instead.
 pub fn run(
     request: Request,
     out: &Path,
@@ -82,17 +82,17 @@ pub fn run(
 }
 
 impl Evaluation {
-    /// All detectors behind one twin.
+    /// Evaluates all detectors behind one twin.
     fn behind(
         &mut self,
         index: usize,
         out: &Path,
         progress: &Progress<'_>,
     ) -> Result<(), EvaluateError> {
-        /// Share of the progress once the twins are fitted.
+        /// Completed fraction when the twins are fitted.
         /// Tuned: by hand, for the progress that is shown; no number depends on it.
         const FITTED: f64 = 0.1;
-        /// Share of the progress once the detectors have learnt.
+        /// Completed fraction when the detectors have learnt.
         /// Tuned: by hand, for the progress that is shown; no number depends on it.
         const LEARNT: f64 = 0.6;
         let request = &self.request;
@@ -151,7 +151,7 @@ impl Evaluation {
         notes.extend(odd.unjudged(&runners));
         notes.extend(notes::silent(&runners));
         self.lost += odd.lost;
-        // Twins behind one source find the same.
+        // Twins behind one source report the same findings.
         self.findings = by_recording(&odd.findings);
         for note in notes.into_iter().chain(odd.all) {
             if !self.notes.contains(&note) {
@@ -163,7 +163,7 @@ impl Evaluation {
         Ok(())
     }
 
-    /// Keeps the detectors behind a twin, the seeds of each together.
+    /// Stores the detectors behind a twin, grouped by detector with one entry per seed.
     fn keep(&mut self, twin: usize, runners: Vec<Runner>) {
         for runner in runners {
             match self.runs.last_mut() {
@@ -179,7 +179,7 @@ impl Evaluation {
     }
 }
 
-/// Lets a recording go through the twin, and notes what is odd about it.
+/// Plays a recording through the twin and notes its irregularities.
 fn play(
     session: &mut Session<'_>,
     recording: &Named,
@@ -195,7 +195,7 @@ fn play(
     Ok(played)
 }
 
-/// The train and the validation recordings behind the twin, without readings that no arm makes.
+/// Plays the train and validation recordings through the twin and excludes corrupt readings.
 fn lessons(
     request: &Request,
     session: &mut Session<'_>,
@@ -219,8 +219,8 @@ fn lessons(
     Ok([train, validation])
 }
 
-/// Leaves out the detectors that could not judge `recording`, and notes why; one that was asked for by name is an
-/// error, and so is that none is left.
+/// Removes the detectors that could not judge `recording`, and notes why. Fails if such a detector was named by the
+/// user, or if no detector remains.
 fn leave_out_failed(
     runners: &mut Vec<Runner>,
     results: Vec<Result<(), StageError>>,
@@ -252,14 +252,14 @@ fn leave_out_failed(
     Ok(())
 }
 
-/// How long a detector learns, compared with others: nets for long.
+/// Training time of a detector relative to one that is not a neural network.
 fn effort(entry: &Entry) -> usize {
     /// Tuned: by hand, for the progress that is shown; no number depends on it.
     const OF_NETS: usize = 30;
     if entry.random { OF_NETS } else { 1 }
 }
 
-/// Lets every detector learn. Those that cannot are noted, unless somebody asked for just them.
+/// Trains every detector. One that cannot learn is noted; if the user named the detectors, it is an error.
 fn learn(
     request: &Request,
     twin: &Prepared,
@@ -300,7 +300,7 @@ fn learn(
     for result in results {
         match result {
             Ok(runner) => {
-                // What its random siblings say, too, is said once.
+                // All seeds of a detector give the same warning; keep one.
                 let warning = runner.config.warning(&setup);
                 notes.extend(warning.filter(|warning| !notes.contains(warning)));
                 notes.extend(

@@ -1,4 +1,4 @@
-//! What an evaluation leaves behind.
+//! Output files of an evaluation.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -24,18 +24,18 @@ const PAGE: &str = "report.html";
 const RESULTS: &str = "results.parquet";
 const EVENTS: &str = "events.parquet";
 
-/// Why results are not written.
+/// Error while writing results.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// A file or folder cannot be written where it was asked for.
+    /// A file or folder that cannot be written.
     #[error(transparent)]
     Refused(#[from] Report),
-    /// A result cannot be put into its format.
+    /// A result that cannot be encoded.
     #[error("{what}: {source}")]
     Failed {
         /// The result.
         what: &'static str,
-        /// Why.
+        /// The cause.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
 }
@@ -59,22 +59,21 @@ fn write_whole(path: &Path, content: &[u8]) -> Result<(), WriteError> {
     })
 }
 
-/// One recording and detector, as the scorer reads it.
+/// Detections of one detector in one recording.
 #[derive(Debug, Serialize)]
 struct Detections<'a> {
     recording: &'a str,
     detector: &'a str,
     twin: &'a str,
-    /// The table of scores beside the file.
+    /// File name of the table of scores, in the same folder.
     scores: &'a str,
     threshold: Option<f64>,
     events: &'a [Event],
 }
 
-/// Writes everything to `out`: by recording and detector the events and scores of the first seed, the tables
-/// and the page. The results behind the first twin lie at the top, those behind another in a folder of its
-/// name, there with `@` and the twin's name behind the detector's, so that one who reads all of them cannot
-/// mistake one for the other.
+/// Writes all results to `out`: the events and scores of the first seed per recording and detector, the tables and
+/// the page. Results behind the first twin are written to `out` itself, those behind another twin to a subfolder
+/// of its name. There the detector's name is followed by `@` and the twin's name, so that the names stay unique.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -122,7 +121,7 @@ pub fn write(
     Ok([PAGE, RESULTS, EVENTS].map(|name| out.join(name)).to_vec())
 }
 
-/// The twin as a pipeline loads it, with the statistics that thresholds are made from.
+/// Writes the twin as a pipeline loads it, with the score statistics from which thresholds are set.
 fn write_twin<'a>(
     folder: &Path,
     twin: &Prepared,
@@ -141,7 +140,7 @@ fn write_twin<'a>(
     write_whole(&folder.join("twin.yaml"), text.as_bytes())
 }
 
-/// The files that an evaluation into `out` writes.
+/// Returns the files that an evaluation into `out` writes.
 pub fn results(out: &Path, request: &Request) -> Vec<PathBuf> {
     let mut files = [PAGE, RESULTS, EVENTS].map(|name| out.join(name)).to_vec();
     for (index, twin) in request.twins.iter().enumerate() {
@@ -165,10 +164,10 @@ pub fn results(out: &Path, request: &Request) -> Vec<PathBuf> {
     files
 }
 
-/// Makes the folder for results.
+/// Creates the folder for results.
 ///
 /// # Errors
-/// If it cannot be made.
+/// If it cannot be created.
 pub fn prepare(out: &Path) -> Result<(), WriteError> {
     make(out)
 }

@@ -1,5 +1,5 @@
-//! `report.html`: the tables with receiver operating characteristics and delays, one page that needs nothing
-//! else; it looks as explain's page does and keeps its rules.
+//! `report.html`: one self-contained page with the tables, receiver operating characteristics and delays. It shares
+//! the style sheet and the content security policy of explain's page.
 
 mod delays;
 mod recommendation;
@@ -18,17 +18,17 @@ use crate::judged::Judged;
 use crate::recording::Role;
 use crate::tables::Table;
 
-/// What explain's style sheet has no name for.
+/// Style rules in addition to explain's style sheet.
 const OWN_STYLE: &str = include_str!("html/style.css");
 
-/// Colours of the style sheet; further detectors take them again with a dashed line.
+/// Number of line colours in the style sheet; further detectors reuse them with a dashed line.
 /// Physical: the number of colours in the style sheet.
 const COLOURS: usize = 7;
 
 /// The page.
 ///
 /// # Errors
-/// If the set's files cannot be read any more.
+/// If the set's files can no longer be read.
 pub fn page(
     evaluation: &Evaluation,
     judged: &[Judged<'_>],
@@ -156,7 +156,7 @@ fn tables(tables: &[Table]) -> Markup {
     }
 }
 
-/// A detector's name, which a narrow screen breaks behind an underscore and nowhere else.
+/// A detector's name that may be broken after an underscore only, for narrow screens.
 fn breakable(name: &str) -> Markup {
     html! {
         @for (index, part) in name.split_inclusive('_').enumerate() {
@@ -194,7 +194,7 @@ fn footer(provenance: &BTreeMap<String, String>) -> Markup {
                     dt { "Best F1" } dd { "The best over thresholds of mean + i standard deviations of the validation scores, for the i of the papers: what the method could do, not what a user would get. The threshold that was set may lie between two of them and do a little better." }
                     dt { "Found" } dd { "An alarm from 20 ms before the labelled beginning to 150 ms after the end." }
                     dt { "False alarm" } dd { "An alarm that belongs to no contact, nor comes in the rest after one; those within 250 ms of each other count once." }
-                    dt { "Under … an hour at 95 %" } dd { "A detector with this rate would raise so few false alarms, or fewer, in one of 20 evaluations like this one (Poisson). Few minutes without contact cannot show a low rate." }
+                    dt { "Under … an hour at 95 %" } dd { "A detector with this rate would raise at most this number of false alarms in one of 20 evaluations like this one (Poisson). Few minutes without contact cannot show a low rate." }
                     dt { "Recommended" } dd { "The fewest mistakes: missed contacts and false alarms together. Of equals the one that is in alarm for less time, then the faster one. A detector that is in alarm for more than 5 % of the time without contact is not recommended." }
                 }
             }

@@ -1,4 +1,4 @@
-//! What is to be evaluated: the set file and the arguments, everything named looked up.
+//! Evaluation request: the set file and the command-line options, with all names and paths resolved.
 
 mod arm;
 mod labelled;
@@ -23,31 +23,31 @@ use crate::labels::{self, LabelsFile, Truth};
 use crate::recording::{Named, Role};
 use crate::registry::Facts;
 
-/// Where the expected effort comes from.
+/// Source of the expected effort.
 #[derive(Debug, Clone)]
 pub enum TwinSource {
-    /// The robot's model as the URDF has it.
+    /// The rigid-body model of the URDF.
     Rigid,
-    /// The same with a gain and an offset per joint, fitted on the set's train recordings.
+    /// The rigid-body model with a gain and an offset per joint, fitted on the set's train recordings.
     Regression,
-    /// Somebody else's twin on a topic, with a gain and an offset per joint.
+    /// An external twin on a topic, with a gain and an offset per joint.
     Topic,
-    /// A corrected twin out of a file.
+    /// A corrected twin from a file.
     File(Box<TwinFile>),
 }
 
 /// A twin to evaluate detectors behind.
 #[derive(Debug, Clone)]
 pub struct TwinChoice {
-    /// What it goes by in tables and folders.
+    /// Name in tables and folders.
     pub name: String,
-    /// What it is.
+    /// Source of the expected effort.
     pub source: TwinSource,
     /// The file it came from.
     pub path: Option<PathBuf>,
 }
 
-/// What is to be evaluated.
+/// Evaluation request.
 #[derive(Debug)]
 pub struct Request {
     /// The set.
@@ -56,28 +56,28 @@ pub struct Request {
     pub path: PathBuf,
     /// The arm.
     pub cell: Cell,
-    /// In the order of the session: train, validation, test.
+    /// Recordings in the order of the session: train, validation, test.
     pub recordings: Vec<Named>,
-    /// What runs.
+    /// Detectors to evaluate.
     pub detectors: Vec<&'static Entry>,
-    /// Whether somebody asked for just these: then one that cannot run is an error.
+    /// Whether the user named the detectors; then a detector that cannot run is an error.
     pub explicit: bool,
-    /// Behind which twins.
+    /// Twins behind which the detectors run.
     pub twins: Vec<TwinChoice>,
-    /// Low-pass on the velocity and on the efforts \[Hz\], where not the twin's own.
+    /// Cutoff frequencies of the low-passes on velocity and on efforts \[Hz\]; `None` for the twin's own.
     pub cutoffs_hz: [Option<f64>; 2],
-    /// How many detectors run at once.
+    /// Number of detectors that run in parallel.
     pub jobs: usize,
-    /// What the reader of the tables should know.
+    /// Remarks for the reader of the tables.
     pub notes: Vec<String>,
 }
 
-/// What the command line says beside the set.
+/// Command-line options in addition to the set.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// Names of detectors; empty for those that fit the set, `all` for all.
+    /// Names of detectors; empty for those that suit the set, `all` for all.
     pub detectors: Vec<String>,
-    /// `rigid`, `regression`, `topic`, or paths of twins; empty for the usual one.
+    /// `rigid`, `regression`, `topic`, or paths of twins; empty for the default.
     pub twins: Vec<String>,
     /// See [`Request::cutoffs_hz`].
     pub cutoffs_hz: [Option<f64>; 2],
@@ -86,7 +86,7 @@ pub struct Options {
 }
 
 impl Request {
-    /// Topics of the recordings, with the other twin's where `reference`.
+    /// Topics of the recordings; `reference` includes that of the external twin.
     pub fn topics(&self, reference: bool) -> Topics {
         let topics = &self.set.topics;
         Topics {
@@ -99,18 +99,17 @@ impl Request {
         }
     }
 
-    /// Where a link stands along the arm: the place of the joint that moves it. Of links that are fixed to
-    /// each other all have the same.
+    /// Returns the index of the joint that moves a link. Links that are fixed to each other have the same index.
     pub fn place(&self, link: &str) -> Option<usize> {
         let model: &Model = self.cell.model.as_ref()?;
         model.links()[model.link_index(link)?].joint
     }
 }
 
-/// Reads the set at `path` and looks up everything that it and the command line name.
+/// Reads the set at `path` and resolves everything that the set and the command line name.
 ///
 /// # Errors
-/// Everything that is wrong with them.
+/// All problems found.
 pub fn load(path: &Path, options: &Options) -> Result<Request, Report> {
     let file: Located<SetFile> = yaml::load(path)?;
     let set = file.value.clone();
@@ -143,7 +142,7 @@ pub fn load(path: &Path, options: &Options) -> Result<Request, Report> {
     })
 }
 
-/// The set's recordings with what touched the robot in them.
+/// The set's recordings with their labelled contacts.
 fn recordings(
     file: &Located<SetFile>,
     labels: Option<&LabelsFile>,
@@ -158,7 +157,7 @@ fn recordings(
     ] {
         let given = paths.iter().enumerate().flat_map(|(index, path)| {
             let path = file.resolve(path);
-            // Whoever opens what is no data set says what is wrong.
+            // A path that is no data set is reported when it is opened.
             let all = recordings_at(&path).unwrap_or_else(|_| vec![path]);
             all.into_iter().map(move |path| (index, path))
         });
@@ -189,7 +188,7 @@ fn recordings(
     all
 }
 
-/// The time of a recording's first joint state, and the content of its topic of contacts.
+/// Returns the stamp of a recording's first joint state and the contacts of its contact topic.
 fn open(path: &Path, state: &str, contact: Option<&str>) -> Result<(i64, Option<Truth>), String> {
     let wrong = |error: SessionError| error.to_string();
     let recording = tauscope_session::open(path).map_err(|error| wrong(error.into()))?;
@@ -206,7 +205,7 @@ fn open(path: &Path, state: &str, contact: Option<&str>) -> Result<(i64, Option<
     Ok((start_ns, truth))
 }
 
-/// Refuses what an evaluation finds itself among the detectors' settings.
+/// Rejects detector settings that the evaluation determines itself.
 fn learnt_here(file: &Located<SetFile>, report: &mut Report) {
     let found = file.value.detectors.all().flat_map(|settings| {
         let keys = settings.found_by_evaluation().into_iter();

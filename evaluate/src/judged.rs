@@ -1,24 +1,24 @@
-//! Detectors against the labels of the test recordings: what tables, pages and files are made from.
+//! Detectors scored against the labels of the test recordings, as input of tables, pages and files.
 
 use crate::evaluation::{Evaluation, Run};
 use crate::metrics::{Matched, Numbers, Scored};
 use crate::recording::Role;
 use crate::runner::Runner;
 
-/// A detector behind a twin, judged.
+/// A detector behind a twin, scored.
 pub struct Judged<'a> {
-    /// Which it is.
+    /// The detector, with all its seeds.
     pub run: &'a Run,
-    /// What it goes by: the detector, and the twin where there are several.
+    /// Label: the detector, and the twin if there are several.
     pub label: String,
-    /// The labelled test recordings, of the first seed.
+    /// Scores of the labelled test recordings, of the first seed.
     pub scored: Vec<Scored<'a>>,
-    /// Over all of them, by seed.
+    /// Figures over all of these recordings, by seed.
     pub numbers: Vec<Numbers>,
 }
 
 impl<'a> Judged<'a> {
-    /// Of every detector behind every twin.
+    /// Scores every detector behind every twin.
     pub fn all(evaluation: &'a Evaluation) -> Vec<Self> {
         let several = evaluation.twins.len() > 1;
         let judge = |run: &'a Run| {
@@ -46,19 +46,19 @@ impl<'a> Judged<'a> {
         evaluation.runs.iter().map(judge).collect()
     }
 
-    /// The numbers of the first seed.
+    /// Figures of the first seed.
     pub fn first(&self) -> &Numbers {
         &self.numbers[0]
     }
 
-    /// Every true event of the test recordings, with what was said of it.
+    /// Every labelled event of the test recordings, with the detection that found it.
     pub fn matched(&self) -> impl Iterator<Item = Matched<'a>> {
         self.scored
             .iter()
             .flat_map(|one| one.matching.events.clone())
     }
 
-    /// Whether it tells collisions from cooperations.
+    /// Whether it distinguishes collisions from cooperations.
     pub fn tells_kinds(&self) -> bool {
         let outputs = &self.run.first().outputs;
         let mut events = outputs.iter().flat_map(|output| &output.events);

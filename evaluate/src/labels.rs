@@ -1,4 +1,4 @@
-//! What touched the robot in the recordings of a set: from a file of labels, or from the contact topic.
+//! Labelled contacts of the recordings of a set, from a file of labels or from the contact topic.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,17 +8,17 @@ use tauscope_archive::{ArchiveError, Recording, ros};
 use tauscope_detect::{ContactKind, LabelledContact};
 use tauscope_pipeline::suggest;
 
-/// `labels.json`. What is in it beyond this is passed over.
+/// Content of `labels.json`; other keys are ignored.
 #[derive(Debug, Clone, Deserialize)]
 pub struct LabelsFile {
-    /// By the recording's name.
+    /// Labels by the recording's name.
     pub recordings: BTreeMap<String, Truth>,
 }
 
-/// What touched the robot in one recording; times in seconds from its first joint state.
+/// Labelled contacts of one recording; times in seconds from its first joint state.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 pub struct Truth {
-    /// Length of the recording \[s\]; without it that of its samples.
+    /// Length of the recording \[s\]; if absent, that of its samples.
     #[serde(default)]
     pub duration: Option<f64>,
     /// The contacts.
@@ -42,30 +42,30 @@ pub struct TrueEvent {
     /// Force on the robot at its peak, world frame \[N\].
     #[serde(default)]
     pub force: Option<[f64; 3]>,
-    /// Too weak to be counted either way.
+    /// Whether it is too weak to be scored.
     #[serde(default)]
     pub ignore: bool,
-    /// Who cooperated.
+    /// The person who cooperated.
     #[serde(default)]
     pub operator: Option<String>,
-    /// Whether they had done so before.
+    /// Whether this person had cooperated before.
     #[serde(default)]
     pub experienced: Option<bool>,
-    /// The kind of contact it came on top of.
+    /// Kind of the contact during which this one began.
     #[serde(default)]
     pub during: Option<String>,
-    /// What was hit.
+    /// Material that was hit.
     #[serde(default)]
     pub material: Option<String>,
-    /// The motion it was hit in.
+    /// Motion of the robot at the hit.
     #[serde(default, rename = "move")]
     pub motion: Option<String>,
-    /// Where in the workspace it was hit.
+    /// Zone of the workspace in which it was hit.
     #[serde(default)]
     pub zone: Option<String>,
 }
 
-/// Of contacts, as the labels have them.
+/// Kinds of contacts in labels.
 pub const KINDS: [&str; 3] = ["contact", "collision", "cooperation"];
 
 fn contact() -> String {
@@ -73,7 +73,7 @@ fn contact() -> String {
 }
 
 impl TrueEvent {
-    /// What a detector learns of it; `start_ns` is the recording's first stamp.
+    /// Converts to the label that a detector learns from; `start_ns` is the recording's first stamp.
     pub fn labelled(&self, start_ns: i64) -> LabelledContact {
         let ns = |t: f64| start_ns + (t * 1e9).round() as i64;
         LabelledContact {
@@ -90,7 +90,7 @@ impl TrueEvent {
 }
 
 impl Truth {
-    /// What is wrong with it.
+    /// Checks times and kinds; returns a description of the first error.
     pub fn check(&self) -> Result<(), String> {
         if let Some(duration) = self.duration
             && !(duration.is_finite() && duration >= 0.0)
@@ -122,7 +122,7 @@ impl Truth {
 /// Reads a file of labels.
 ///
 /// # Errors
-/// What is wrong with it, as a sentence.
+/// A description of the first error.
 pub fn read(path: &Path) -> Result<LabelsFile, String> {
     let text = std::fs::read_to_string(path).map_err(|error| format!("cannot read: {error}"))?;
     let file: LabelsFile =
@@ -135,8 +135,8 @@ pub fn read(path: &Path) -> Result<LabelsFile, String> {
     Ok(file)
 }
 
-/// The contacts that a topic of `std_msgs/msg/Bool` flags; `None` if the recording has no such topic. The
-/// messages have no stamp: their log time counts, from `start_log_ns` on.
+/// Reads the contacts that a topic of `std_msgs/msg/Bool` flags; `None` if the recording has no such topic. The
+/// messages have no stamp, so their log time relative to `start_log_ns` is used.
 ///
 /// # Errors
 /// If the recording cannot be read.
@@ -153,7 +153,7 @@ pub fn from_topic(
     let mut messages = recording.messages(&[topic])?;
     while let Some(message) = messages.next_message() {
         let message = match message {
-            // The part that cannot be read is counted where the joint states are read.
+            // Unreadable parts are counted when the joint states are read.
             Err(ArchiveError::Damaged(_)) => continue,
             other => other?,
         };
@@ -169,7 +169,7 @@ pub fn from_topic(
     }))
 }
 
-/// From where a flag is set to where it is last seen set.
+/// Intervals from the first to the last message of each run of set flags.
 fn spans(flags: &[(f64, bool)]) -> Vec<TrueEvent> {
     let mut events: Vec<TrueEvent> = Vec::new();
     let mut open = false;

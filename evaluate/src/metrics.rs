@@ -1,4 +1,4 @@
-//! What an evaluation counts, each number by one rule.
+//! Performance figures of an evaluation.
 
 pub mod events;
 pub mod numbers;

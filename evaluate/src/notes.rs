@@ -1,4 +1,4 @@
-//! What was odd in the recordings of a set.
+//! Notes on irregularities in the recordings of a set.
 
 mod totals;
 
@@ -17,30 +17,30 @@ use crate::recording::{Named, Role};
 use crate::runner::Runner;
 use crate::session::Played;
 
-/// Recordings with an oddity are named one by one up to so many.
+/// Largest number of recordings for which an irregularity is noted one by one.
 /// Tuned: by eye, for the length of the notes.
 const MOST_SINGLY: usize = 4;
 
-/// What was odd, over all recordings behind one twin.
+/// Irregularities of all recordings behind one twin.
 #[derive(Debug, Default)]
 pub struct Notes {
-    /// Samples and stretches that were lost or refused.
+    /// Number of samples and damaged parts that were lost or refused.
     pub lost: u64,
-    /// What the reader should know.
+    /// Remarks for the reader.
     pub all: Vec<String>,
-    /// By recording, what is odd or wrong about it.
+    /// Findings by recording.
     pub findings: Vec<(String, Vec<Finding>)>,
-    /// Recordings of which the twin's filters passed over more than half.
+    /// Recordings in which the twin's filters had not settled for more than half of the samples.
     unsettled: BTreeSet<String>,
-    /// What only all of them together tell.
+    /// Sums over all recordings.
     totals: Totals,
 }
 
 impl Notes {
-    /// Takes down what was odd in `recording`.
+    /// Records the irregularities of `recording`.
     ///
     /// # Errors
-    /// If no sample of it holds efforts: there is nothing that any detector could judge.
+    /// If no sample of it holds efforts, so that no detector can judge it.
     pub fn add(&mut self, recording: &Named, played: &Played) -> Result<(), EvaluateError> {
         let (name, samples) = (&recording.name, &played.samples);
         let holds = |flag| samples.iter().any(|sample| sample.header.has(flag));
@@ -85,12 +85,13 @@ impl Notes {
         Ok(())
     }
 
-    /// What the recordings together are odd in, once all are there.
+    /// Adds the irregularities of all recordings taken together, after the last one was added.
     pub fn close(&mut self, request: &Request) {
         self.all.extend(self.totals.notes(request));
     }
 
-    /// Test recordings of which detectors judged less than half, though the twin's filters had settled.
+    /// Notes test recordings in which detectors judged less than half of the samples, although the twin's filters had
+    /// settled.
     pub fn unjudged(&self, runners: &[Runner]) -> Vec<String> {
         let mut by_recording: BTreeMap<&str, (usize, Vec<String>)> = BTreeMap::new();
         for runner in runners.iter().filter(|runner| runner.seed == 0) {
@@ -126,7 +127,7 @@ impl Notes {
     }
 }
 
-/// What the labels of a recording say of times at which there is none of it.
+/// Notes labels that reach beyond the end of a recording.
 fn beyond(recording: &Named, last_s: f64) -> Vec<String> {
     let Some(truth) = &recording.truth else {
         return Vec::new();
@@ -163,7 +164,7 @@ fn beyond(recording: &Named, last_s: f64) -> Vec<String> {
     notes
 }
 
-/// Detectors whose threshold no score can reach.
+/// Notes detectors whose threshold no score can reach.
 pub fn silent(runners: &[Runner]) -> Vec<String> {
     let note = |runner: &Runner| {
         let largest = runner.largest_score?;
@@ -177,8 +178,7 @@ pub fn silent(runners: &[Runner]) -> Vec<String> {
     runners.iter().filter_map(note).collect()
 }
 
-/// Says which recordings are learnt from as free of contacts because nobody has said what touched the robot
-/// in them.
+/// Notes recordings that are treated as contact-free because they have no labels.
 pub fn unlabelled(request: &Request) -> Option<String> {
     let learnt_from =
         |recording: &&Named| recording.role != Role::Test && recording.truth.is_none();

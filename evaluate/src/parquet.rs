@@ -1,4 +1,4 @@
-//! `results.parquet` and `events.parquet`: flat, so that any SQL tool reads them.
+//! `results.parquet` and `events.parquet`, as flat tables that any SQL tool reads.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use crate::metrics::{Matched, Numbers, Scored};
 use crate::recording::Role;
 use crate::runner::{Output, Runner};
 
-/// A table that grows row by row; the columns' names come with every row, the same each time.
+/// A table that grows row by row. Each row passes the same column names.
 #[derive(Default)]
 struct Rows {
     texts: Vec<(&'static str, Vec<Option<String>>)>,
@@ -63,8 +63,8 @@ impl Rows {
     }
 }
 
-/// Writes a row per twin, detector, seed and recording, and one over all test recordings, whose `recording`
-/// is null. What was not scored for want of labels is NaN.
+/// Writes a row per twin, detector, seed and recording, and one over all test recordings, whose `recording` is null.
+/// Figures that need labels are NaN without them.
 pub fn write_results(path: &Path, evaluation: &Evaluation) -> Result<(), TableError> {
     let mut rows = Rows::default();
     for run in &evaluation.runs {
@@ -156,7 +156,7 @@ fn numbers(rows: &mut Rows, numbers: &Numbers) {
 /// Writes a row per true event of a test recording, and one per false alarm, whose `t_on_s` is NaN.
 pub fn write_events(path: &Path, judged: &[Judged<'_>]) -> Result<(), TableError> {
     let mut rows = Rows::default();
-    // The columns are there even if no row is.
+    // Creates the columns even if no row follows.
     event(&mut rows, "", "", None, None);
     rows.clear();
     for judged in judged {

@@ -1,22 +1,22 @@
-//! A recording of a set: what it is for, and what touched the robot in it.
+//! A recording of a set, with its role and its labelled contacts.
 
 use std::path::PathBuf;
 
 use crate::labels::Truth;
 
-/// What a recording is for.
+/// Role of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// To train on.
+    /// Training.
     Train,
-    /// To choose thresholds on.
+    /// Choice of thresholds.
     Validation,
-    /// To be scored.
+    /// Scoring.
     Test,
 }
 
 impl Role {
-    /// As the labels and tables have it.
+    /// Name in labels and tables.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Train => "train",
@@ -29,14 +29,14 @@ impl Role {
 /// A recording of the set.
 #[derive(Debug, Clone)]
 pub struct Named {
-    /// The file's stem, which no other of the set has.
+    /// The file's stem, unique within the set.
     pub name: String,
-    /// Where it lies.
+    /// Path of the file.
     pub path: PathBuf,
-    /// What it is for.
+    /// Role in the evaluation.
     pub role: Role,
-    /// Stamp of its first joint state \[ns since the epoch\]: where its seconds begin.
+    /// Stamp of its first joint state, the zero of its relative times \[ns since the epoch\].
     pub start_ns: i64,
-    /// What touched the robot; `None` if nobody has said.
+    /// Labelled contacts; `None` if the recording has no labels.
     pub truth: Option<Truth>,
 }

@@ -1,5 +1,5 @@
-//! Which detectors run on a set, and how each comes to its settings. What there is, the detectors' own table
-//! says ([`DETECTORS`](tauscope_detect::DETECTORS)).
+//! Choice of the detectors that suit a set, and training of their settings.
+//! [`DETECTORS`](tauscope_detect::DETECTORS) lists all detectors.
 
 use std::path::PathBuf;
 
@@ -10,31 +10,31 @@ use tauscope_pipeline::trained;
 
 use crate::recording::{Named, Role};
 
-/// How many seeds a detector is trained with in whose training chance has a part.
+/// Number of seeds with which a detector with random training is trained.
 /// Statistical: the mean over five seeds has a standard error of 0.45 standard deviations.
 pub const SEEDS: u64 = 5;
 
-/// What there is to learn from.
+/// Input of a detector's training.
 #[derive(Debug)]
 pub struct Task<'a> {
     /// The cell and its twin.
     pub setup: &'a Setup,
     /// Train and validation recordings behind the twin.
     pub lessons: Lessons<'a>,
-    /// For so long nothing touches the robot at the beginning of each recording \[s\].
+    /// Contact-free time at the beginning of each recording \[s\].
     pub free_first_s: f64,
-    /// For what is drawn by chance.
+    /// Seed of the random number generator.
     pub seed: u64,
-    /// How long the fit of the twin took, if it was fitted \[s\].
+    /// Wall time of the twin's fit, if it was fitted \[s\].
     pub twin_fit_s: Option<f64>,
-    /// What the set says of the detectors' settings.
+    /// Detector settings given by the set.
     pub given: &'a Config,
-    /// Where trained weights go; the ending is the detector's.
+    /// Path of the trained weights, without the extension.
     pub weights: PathBuf,
 }
 
 impl Task<'_> {
-    /// Trains or tunes a detector: what its part of a pipeline file would be.
+    /// Trains or tunes a detector and returns its part of a pipeline file.
     ///
     /// # Errors
     /// If it cannot learn from these recordings, or its weights cannot be written.
@@ -44,7 +44,7 @@ impl Task<'_> {
         let (mut settings, trained) = given.learn(&self.of_detector())?;
         if let (Some(trained), Some(file)) = (trained, settings.trained_file()) {
             let path = trained::write(&self.weights, &self.lessons, trained)?;
-            // Of an evaluation that is interrupted nothing stays.
+            // An interrupted evaluation must leave no files.
             whole_file::is_part_of_unfinished(&path);
             *file = Some(path);
         }
@@ -56,10 +56,10 @@ impl Task<'_> {
         Ok(shared.with_any(settings))
     }
 
-    /// The curves behind what was learnt, where a detector was tuned by some.
+    /// Returns the trade-off curves by which a detector was tuned, if any.
     ///
     /// # Errors
-    /// As [`learn`](Self::learn).
+    /// If the detector cannot learn from these recordings.
     pub fn sweeps(&self, learnt: &Config) -> Result<Option<Sweeps>, LearnError> {
         let mut all = learnt.all();
         let sweeps = all
@@ -78,17 +78,17 @@ impl Task<'_> {
     }
 }
 
-/// What kind of set it is.
+/// Properties of a set that determine the suitable detectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Facts {
-    /// The train recordings tell collisions from cooperations.
+    /// The labels of the train recordings distinguish collisions from cooperations.
     pub kinds: bool,
-    /// The same cycle is repeated.
+    /// The arm repeats a cycle.
     pub cyclic: bool,
 }
 
 impl Facts {
-    /// Of a set and its labels.
+    /// Determines the properties of a set and its labels.
     pub fn of(set: &SetFile, recordings: &[Named]) -> Self {
         let train = (recordings.iter()).filter(|recording| recording.role == Role::Train);
         let events = train.filter_map(|recording| recording.truth.as_ref());
@@ -102,7 +102,7 @@ impl Facts {
         }
     }
 
-    /// Whether `entry` runs on such a set where nobody names detectors.
+    /// Whether `entry` runs on such a set by default.
     pub fn suit(self, entry: &Entry) -> bool {
         match entry.suits {
             Suits::All => true,

@@ -1,5 +1,5 @@
-//! One detector over the session: it learns, its threshold is set on the validation recordings, and then
-//! every sample of validation and test passes through the same stage that a pipeline runs.
+//! One detector over the session: it learns and its threshold is set on the validation recordings. Then every
+//! sample of the validation and test recordings passes through the stage that a pipeline runs.
 
 use std::time::Instant;
 
@@ -14,29 +14,29 @@ use crate::recording::{Named, Role};
 use crate::registry::Task;
 use crate::twin::is_free_of;
 
-/// What a detector made of one recording.
+/// Output of a detector for one recording.
 #[derive(Debug, Clone)]
 pub struct Output {
     /// The recording.
     pub recording: String,
-    /// What it is for.
+    /// Role of the recording.
     pub role: Role,
     /// Stamps \[s from the first joint state\].
     pub t: Vec<f64>,
-    /// The score of each sample. One that the detector was not ready for cannot raise an alarm: it stands with
-    /// the lowest score of the validation recordings, and within these with their mean, so that it does
-    /// not move the threshold.
+    /// Score of each sample. A sample that the detector was not ready for has the lowest score of the validation
+    /// recordings, so that it cannot raise an alarm. Within validation recordings it has their mean, so that it does
+    /// not shift the threshold.
     pub scores: Vec<f64>,
-    /// What it found.
+    /// Detected events.
     pub events: Vec<Event>,
-    /// Samples that the detector was not ready for.
+    /// Number of samples that the detector was not ready for.
     pub not_judged: usize,
-    /// How long it took \[s\].
+    /// Wall time of the detector \[s\].
     pub took_s: f64,
 }
 
 impl Output {
-    /// From the first to the last sample \[s\].
+    /// Time from the first to the last sample \[s\].
     pub fn duration_s(&self) -> f64 {
         match (self.t.first(), self.t.last()) {
             (Some(first), Some(last)) => last - first,
@@ -45,39 +45,39 @@ impl Output {
     }
 }
 
-/// A detector that has learnt, on its way through the session: started anew with each recording, as a pipeline starts it, and told what it
-/// kept of its life before.
+/// A trained detector that goes through the session. As in a pipeline, it is restarted for each recording and
+/// resumes its learnt state.
 pub struct Runner {
-    /// Which it is.
+    /// The detector's entry in the table of detectors.
     pub entry: &'static Entry,
     /// Its seed.
     pub seed: u64,
-    /// Its part of a pipeline file, with all that the training and validation recordings taught it.
+    /// Its part of a pipeline file, with the state learnt from the training and validation recordings.
     pub config: Config,
-    /// The curves behind what it has learnt.
+    /// Trade-off curves by which it was tuned.
     pub sweeps: Option<Sweeps>,
-    /// How long it learnt \[s\], without the curves; NaN if it learns nothing.
+    /// Wall time of training without the curves \[s\]; NaN if it learns nothing.
     pub training_s: f64,
-    /// What its score does on the validation recordings while nothing touches the robot.
+    /// Statistics of its score on the contact-free part of the validation recordings.
     pub statistics: ScoreStatistics,
-    /// Over how many samples.
+    /// Number of samples behind the statistics.
     pub counted: u64,
-    /// Its score from which on it raises an alarm.
+    /// Score at which it raises an alarm.
     pub threshold: f64,
-    /// What its score cannot exceed, where there is such a bound.
+    /// Upper bound of its score, if there is one.
     pub largest_score: Option<f64>,
-    /// What it has said so far.
+    /// Outputs so far.
     pub outputs: Vec<Output>,
-    /// The same, with what it has learnt since.
+    /// Configuration with the state learnt from all recordings so far.
     now: Config,
     setup: Setup,
     lowest: f64,
 }
 
 impl Runner {
-    /// Lets the detector learn and sets its threshold: mean + 4 standard deviations of its score on the
-    /// contact-free part of the validation recordings (of the train recordings if there are none), unless
-    /// it has rules of its own.
+    /// Trains the detector and sets its threshold to mean + 4 standard deviations of its contact-free score. The
+    /// score is measured on the validation recordings, or on the train recordings if there are none. A detector with
+    /// its own decision rule keeps that rule.
     ///
     /// # Errors
     /// If it cannot learn from these recordings.
@@ -128,14 +128,14 @@ impl Runner {
         })
     }
 
-    /// How many samples it judges at once, if it judges windows.
+    /// Length of its windows \[samples\], if it judges windows.
     pub fn window(&self) -> Option<usize> {
         self.config
             .all()
             .find_map(tauscope_detect::AnySettings::window)
     }
 
-    /// Lets the next recording of the session pass through.
+    /// Runs the detector on the next recording of the session.
     ///
     /// # Errors
     /// If the stage fails.
@@ -199,8 +199,8 @@ impl Emit<Detection> for Last {
     }
 }
 
-/// What the score does on the contact-free part of `lessons`, the lowest of all, and how many samples were
-/// counted; those that the detector is not ready for count with the mean. `None` if it never is ready.
+/// Statistics of the score on the contact-free part of `lessons`, the lowest score of all samples, and the number of
+/// contact-free samples. Samples that the detector is not ready for count as the mean. `None` if it is never ready.
 fn statistics(
     config: &Config,
     setup: &Setup,

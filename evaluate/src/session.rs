@@ -1,5 +1,5 @@
-//! The recordings of a set behind one twin, one after the other as one session: what a twin or a
-//! detector has learnt of the arm (how warm it is, what its cycle looks like) it keeps from one to the next.
+//! The recordings of a set behind one twin, played one after the other as one session. The state that a twin or a
+//! detector has learnt (the arm's warm-up, its cycle) is kept from one recording to the next.
 
 use tauscope_archive::Damage;
 use tauscope_bus::{Emit, LinkError, Sample, Source as _, Stage as _, TwinState, flags};
@@ -13,24 +13,24 @@ use tauscope_twin::Twin;
 
 use crate::recording::Named;
 
-/// A recording behind the twin.
+/// Output of the twin for a recording.
 #[derive(Debug, Clone)]
 pub struct Played {
-    /// Every sample, in order.
+    /// All samples in order of time.
     pub samples: Vec<TwinState>,
     /// Findings about the recording.
     pub findings: Vec<Finding>,
-    /// Samples of the recording that were lost or refused.
+    /// Number of samples of the recording that were lost or refused.
     pub refused: u64,
-    /// Parts of the recording that cannot be read, and what was in them is lost.
+    /// Parts of the recording that cannot be read.
     pub damage: Vec<Damage>,
-    /// Gaps and steps of the clock after which the filters began anew.
+    /// Number of gaps and clock steps after which the filters restarted.
     pub gaps: u64,
-    /// Samples at which they had not settled.
+    /// Number of samples at which the filters had not settled.
     pub unsettled: u64,
 }
 
-/// A twin that goes from recording to recording.
+/// A twin that keeps its state from recording to recording.
 pub struct Session<'a> {
     cell: &'a Cell,
     topics: Topics,
@@ -38,12 +38,12 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// A session that begins with the next recording that is played.
+    /// Creates a session that begins with the first recording that is played.
     pub fn new(cell: &'a Cell, topics: Topics, twin: Twin) -> Self {
         Self { cell, topics, twin }
     }
 
-    /// Plays a recording to its end; `progress` is told how far it is, from 0 to 1.
+    /// Plays a recording to its end; `progress` receives the completed fraction, 0 to 1.
     ///
     /// # Errors
     /// If it cannot be read.
@@ -52,7 +52,7 @@ impl<'a> Session<'a> {
         recording: &Named,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Played, ReplayError> {
-        /// Samples between two reports of progress.
+        /// Number of samples between two progress reports.
         /// Resolution: the cost of reporting.
         const STEP: u64 = 1024;
         let file = FileConfig {
@@ -87,7 +87,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// What detectors learn from a recording.
+/// Labelled samples of a recording, from which detectors learn.
 pub fn lesson(recording: &Named, samples: Vec<TwinState>) -> Lesson {
     let events = recording.truth.as_ref().map(|truth| &truth.events);
     Lesson {
@@ -102,7 +102,7 @@ pub fn lesson(recording: &Named, samples: Vec<TwinState>) -> Lesson {
     }
 }
 
-/// Keeps everything that a stage puts out.
+/// Collects the output of a stage.
 struct Gathered<T>(Vec<T>);
 
 impl<T: Sample> Emit<T> for Gathered<T> {

@@ -1,4 +1,4 @@
-//! The papers' tables, and ours: the same rows for the terminal, the page and `--json`.
+//! Tables of the papers and further tables, for the terminal, the page and `--json`.
 
 mod contacts;
 mod cycles;
@@ -14,13 +14,13 @@ use crate::metrics::statistics::{Distribution, mean_sd};
 /// A table.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Table {
-    /// What it tells.
+    /// Title.
     pub title: String,
-    /// How to read it.
+    /// Explanation of the columns.
     pub note: String,
     /// Names of the columns.
     pub head: Vec<String>,
-    /// The first cell of a row says what it is of.
+    /// Rows; the first cell is the label.
     pub rows: Vec<Vec<String>>,
 }
 
@@ -39,7 +39,7 @@ impl Table {
     }
 }
 
-/// All tables that say something of this set.
+/// All tables that apply to this set.
 pub fn all(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Vec<Table> {
     let mut tables = vec![overall::twins(evaluation)];
     let any_label = judged.iter().any(|judged| !judged.scored.is_empty());
@@ -57,7 +57,7 @@ pub fn all(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Vec<Table> {
     tables
 }
 
-/// For a terminal.
+/// Formats tables and notes for a terminal.
 pub fn text(tables: &[Table], notes: &[String]) -> String {
     let mut text = String::new();
     for table in tables {
@@ -82,7 +82,7 @@ pub fn text(tables: &[Table], notes: &[String]) -> String {
     text
 }
 
-/// A number with so many decimals, a dash if it is none.
+/// Formats a number with `decimals` decimals; a dash if it is not finite.
 fn number(value: f64, decimals: usize) -> String {
     if value.is_finite() {
         format!("{value:.decimals$}")
@@ -91,7 +91,7 @@ fn number(value: f64, decimals: usize) -> String {
     }
 }
 
-/// `7 of 9 (78 %)`.
+/// Formats a count with its share: `7/9 (77.8 %)`.
 fn part(count: usize, all: usize) -> String {
     match all {
         0 => "-".to_owned(),
@@ -103,7 +103,7 @@ fn percent(count: usize, all: usize) -> String {
     number(100.0 * count as f64 / all as f64, 1)
 }
 
-/// Mean over seeds, and the spread if there are several.
+/// Formats the mean over seeds, with the standard deviation if there are several.
 fn over_seeds(values: &[f64], decimals: usize) -> String {
     let (mean, sd) = mean_sd(values);
     match values {
@@ -113,7 +113,7 @@ fn over_seeds(values: &[f64], decimals: usize) -> String {
     }
 }
 
-/// Mean and spread in ms.
+/// Formats mean and standard deviation in ms.
 fn mean_sd_ms(of: &Distribution) -> String {
     match of.count {
         0 => "-".to_owned(),

@@ -1,4 +1,4 @@
-//! The twins that detectors are evaluated behind: made, or fitted on what touches nothing.
+//! Twins behind which detectors are evaluated: built, or fitted on contact-free recordings.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -15,33 +15,32 @@ use crate::input::{Request, TwinChoice, TwinSource};
 use crate::recording::{Named, Role};
 use crate::session::Session;
 
-/// A sample this close before the beginning of a contact is not taken for free \[ns\].
+/// Margin before a contact that is not treated as contact-free \[ns\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const BEFORE_NS: i64 = 100_000_000;
-/// Nor is one this close behind its end: the arm swings, and the filters remember \[ns\].
+/// Margin after a contact that is not treated as contact-free, because arm and filters still respond \[ns\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const AFTER_NS: i64 = 500_000_000;
 
-/// No joint reports more than this many times the effort that the model expects.
+/// Largest plausible ratio of measured to modelled effort.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LARGEST_GAIN: f64 = 5.0;
 
-/// A twin, ready.
+/// A twin that is ready to run.
 #[derive(Debug)]
 pub struct Prepared {
-    /// What it goes by.
+    /// Name in tables and folders.
     pub name: String,
-    /// How its stage is configured.
+    /// Configuration of its stage.
     pub config: tauscope_twin::Config,
-    /// What corrects it.
+    /// Corrections and measured noise.
     pub file: TwinFile,
-    /// How long the fit of gains and offsets took, reading included \[s\].
+    /// Wall time of the fit of gains and offsets, including reading \[s\].
     pub fit_s: Option<f64>,
 }
 
 impl Prepared {
-    /// Makes the twin of `choice`; a regression is fitted on the contact-free part of the train
-    /// recordings.
+    /// Builds the twin of `choice`; a regression is fitted on the contact-free part of the train recordings.
     ///
     /// # Errors
     /// If there is nothing to fit on.
@@ -53,7 +52,7 @@ impl Prepared {
         let mut config = tauscope_twin::Config::default();
         let reference = match &choice.source {
             TwinSource::Topic => true,
-            // A corrected topic has no robot.
+            // The file of a corrected external twin names no robot.
             TwinSource::File(file) => {
                 file.robot.name.is_empty() && request.set.topics.twin.is_some()
             }
@@ -104,7 +103,7 @@ impl Prepared {
         })
     }
 
-    /// The set's recordings behind it.
+    /// Starts a session of the set's recordings behind this twin.
     ///
     /// # Errors
     /// If it does not fit the robot.
@@ -114,8 +113,8 @@ impl Prepared {
         Ok(Session::new(&request.cell, request.topics(reference), twin))
     }
 
-    /// Measures the noise of the residual on the contact-free part of `lessons`, about zero: a standing
-    /// error of the twin is noise to a detector, too.
+    /// Measures the noise of the residual on the contact-free part of `lessons`: the root mean square about zero,
+    /// because a constant error of the twin is noise to a detector, too.
     ///
     /// # Errors
     /// If there is no such part.
@@ -144,7 +143,7 @@ impl Prepared {
         Ok(())
     }
 
-    /// Fitted gains that no joint can have.
+    /// Notes implausible fitted gains.
     pub fn doubts(&self) -> Option<String> {
         self.fit_s?;
         let said: Vec<String> = (self.file.joints.iter())
@@ -160,12 +159,12 @@ impl Prepared {
         })
     }
 
-    /// What to say of the first recording whose rate is so low that a low-pass of the twin passes everything.
+    /// Notes the first recording whose rate is so low that a low-pass of the twin has no effect.
     pub fn passing_all(&self, request: &Request) -> Option<String> {
         let filters = self.config.filters(Some(self.file.filters));
         let topics = request.topics(false);
         request.recordings.iter().find_map(|named| {
-            // One that cannot be read has been told.
+            // An unreadable recording was reported when the set was loaded.
             let recording = tauscope_session::open(&named.path).ok()?;
             let rate_hz = recorded_rate_hz(&recording, &topics.state).ok()??;
             let fault = cutoffs_above_half(filters, rate_hz).next()?;
@@ -173,7 +172,7 @@ impl Prepared {
         })
     }
 
-    /// What a detector behind it must know.
+    /// Properties of cell and twin that a detector needs.
     ///
     /// # Errors
     /// If it does not fit the robot.
@@ -198,14 +197,15 @@ fn train(request: &Request) -> Vec<PathBuf> {
     train.map(|recording| recording.path.clone()).collect()
 }
 
-/// Whether, as far as anybody has said, nothing touches the robot at this instant, nor has just done so.
+/// Whether this instant is contact-free by the labels, including the margins before and after a contact. Without
+/// labels every instant is.
 pub fn is_free(recording: &Named, stamp_ns: i64) -> bool {
     let events = recording.truth.iter().flat_map(|truth| &truth.events);
     let mut spans = events.map(|event| event.labelled(recording.start_ns));
     !spans.any(|contact| touches(contact.on_ns, contact.off_ns, stamp_ns))
 }
 
-/// The same of a lesson.
+/// Whether this instant of a lesson is contact-free, as in [`is_free`].
 pub fn is_free_of(lesson: &Lesson, stamp_ns: i64) -> bool {
     let mut contacts = lesson.contacts.iter().flatten();
     !contacts.any(|contact| touches(contact.on_ns, contact.off_ns, stamp_ns))

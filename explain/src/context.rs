@@ -16,22 +16,22 @@ pub struct Context<'a> {
     pub input: &'a Input,
     /// Torque constants by joint \[N m/A\]; 1 where there are none.
     pub constants: &'a [f64],
-    /// N m per recorded unit by joint; 1 where it is not known.
+    /// N m per recorded unit by joint; 1 where it is unknown.
     pub unit_nm: &'a [f64],
-    /// Joints whose scale between the recordings' unit and N m is not known, with the gain that the fit starts from.
+    /// Joints whose torque scale is unknown, each with the initial gain of the fit.
     pub unscaled: Vec<(usize, f64)>,
-    /// New bodies that were found. They load the terms of the start, too.
+    /// Bodies found in addition to those of the twin. The initial terms act on their load, too.
     pub loads: Vec<TermSpec>,
     /// Stamp of the first sample of all recordings \[ns since the epoch\].
     pub session_start_ns: i64,
     /// Whether no joint moves.
     pub at_rest: bool,
-    /// By how much another simulation's effort was late before it was put on the recordings' clock \[s\].
+    /// Delay of an external twin's effort before it was aligned with the clock of the recordings \[s\].
     pub twin_late_s: f64,
 }
 
 impl Context<'_> {
-    /// Every hypothesis for the robot.
+    /// Returns every hypothesis for the robot.
     pub fn hypotheses(&self) -> Vec<Hypothesis> {
         let input = self.input;
         let mut all = library::hypotheses(&input.model, input.bodies, &input.without);
@@ -39,13 +39,13 @@ impl Context<'_> {
         let unscaled = |joint: usize| self.unscaled.iter().any(|(other, _)| *other == joint);
         all.retain(|h| !h.effect.traits.is_scale || !unscaled(h.place.joint));
         if input.fit.iter().any(Recording::is_of_poses) {
-            // The order of poses is no time.
+            // Poses are in no order of time.
             all.retain(|h| h.time_kind() == TimeKind::Always && !h.is_of_timing());
         }
         all
     }
 
-    /// The motion of a recording and the twin's effort for it.
+    /// Computes the motion of a recording and the twin's effort for it.
     ///
     /// # Errors
     /// If a term of the start cannot be built for the robot.
@@ -80,7 +80,7 @@ impl Context<'_> {
         Ok(track)
     }
 
-    /// The data of some recordings, filtered as those that are fitted.
+    /// Prepares recordings with the filters of those that are fitted.
     ///
     /// # Errors
     /// If a term of the start cannot be built for the robot.
@@ -107,7 +107,7 @@ impl Context<'_> {
         if !self.input.bodies && !self.at_rest {
             problem.is_foreign = true;
             leave_out_other_states(&mut problem);
-            // Nobody knows how much friction the other simulation has.
+            // The friction of the external twin is unknown.
             problem.known_friction = vec![library::any_plain_friction(); problem.joints];
         }
         if let Some(start) = &self.input.start {
@@ -124,7 +124,7 @@ impl Context<'_> {
         Ok(problem)
     }
 
-    /// The gain of each joint's bodies that the fit starts from, from the model's unit into the recording's.
+    /// Returns the initial gain of each joint's bodies, from the model's unit to that of the recording.
     fn first_gains(&self) -> Vec<f64> {
         let mut gains: Vec<f64> = self.unit_nm.iter().map(|unit| 1.0 / unit).collect();
         if !self.at_rest {

@@ -23,7 +23,7 @@ use crate::report::{locate, notes, remainder, summary, verdict, without_law};
 
 use judged::{Judged, Stop};
 
-/// Explains the input. `progress` receives the share that is done, 0 to 1, and the name of the step.
+/// Explains the input. `progress` receives the completed share, 0 to 1, and the name of the step.
 ///
 /// # Errors
 /// If a term of the start cannot be built for the robot.
@@ -73,8 +73,7 @@ pub fn explain(
                 slips.add(found, errors);
             }
             Stop::Slips(_) => {
-                let reason =
-                    "so much is wrong with these recordings that they are of another robot";
+                let reason = "these recordings need too many corrections: they are probably of another robot";
                 return Ok(not_evaluated(&input, joints, reason.to_owned()));
             }
             Stop::Reason(reason) => return Ok(not_evaluated(&input, joints, reason)),
@@ -82,18 +81,18 @@ pub fn explain(
     }
 }
 
-/// More faults of recordings than this for each joint are another robot's.
+/// Largest number of faults of the recordings per joint; more indicate another robot.
 /// Resolution: each joint may be in another's place, turned, and have another unit.
 const MOST_SLIPS_PER_JOINT: usize = 3;
 
-/// What came of an attempt to explain.
+/// Result of one attempt to explain.
 enum Attempt {
     Done(Box<Outcome>),
-    /// Why there is no verdict yet, and the error of the twin on the held-out recordings as they are.
+    /// The reason against a verdict, and the error of the twin on the uncorrected held-out recordings.
     Stopped(Stop, Vec<f64>),
 }
 
-/// Explains recordings of which `slips` are mended.
+/// Explains recordings in which `slips` are corrected.
 fn attempt(
     input: &mut Input,
     at_rest: bool,
@@ -150,7 +149,7 @@ fn attempt(
     }
 }
 
-/// The report on the result of a search, with the errors on the held-out recordings.
+/// Evaluates the held-out recordings and writes the report on the result of a search.
 fn conclude(
     context: &Context<'_>,
     judged: Judged,
@@ -229,7 +228,7 @@ fn conclude(
     })
 }
 
-/// Findings for what remains at a joint. What another simulation leaves there may be its own.
+/// Returns findings for the remaining residual of a joint. None for an external twin, whose own errors may cause it.
 fn without_law(input: &Input, remaining: &[Remaining], said: &[Finding]) -> Vec<Finding> {
     if !input.bodies {
         return Vec::new();
@@ -239,7 +238,7 @@ fn without_law(input: &Input, remaining: &[Remaining], said: &[Finding]) -> Vec<
 }
 
 impl Context<'_> {
-    /// Notes on how the twin was compared.
+    /// Returns notes on the comparison with the twin.
     fn notes(&self) -> impl Iterator<Item = String> {
         notes::late_twin(self.twin_late_s).into_iter()
     }
@@ -250,7 +249,7 @@ fn sliding_joints(input: &Input) -> Vec<String> {
     sliding.map(|joint| joint.name.clone()).collect()
 }
 
-/// White noise of the measured effort, by joint \[effort unit\].
+/// Returns the white noise of the measured effort, by joint \[effort unit\].
 fn noise_floor(input: &Input) -> Vec<f64> {
     let n = input.model.dof();
     (0..n).map(|j| white_noise(&input.fit, j, n)).collect()

@@ -21,7 +21,7 @@ pub const URDF: &str = r#"<robot name="two">
     <axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="3" effort="40"/></joint>
 </robot>"#;
 
-/// Samples per second, and how long a recording is \[s\].
+/// Sample rate, and length of a recording \[s\].
 const RATE_HZ: f64 = 100.0;
 const LENGTH_S: f64 = 20.0;
 
@@ -55,8 +55,8 @@ pub fn at_joint(effect: &str, joint: usize) -> Hypothesis {
     }
 }
 
-/// A recording of any arm: sums of sines, other ones for each seed. `add` is given position and velocity of all joints
-/// and changes their effort \[N m\].
+/// Simulates a recording of any arm: sums of sines that depend on the seed. `add` receives position and velocity of
+/// all joints and changes their effort \[N m\].
 pub fn recording(
     model: &Model,
     seed: u64,
@@ -70,7 +70,7 @@ pub fn recording(
     for &t in &time_s {
         let (mut q, mut qd, mut qdd) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         for (j, name) in model.joint_names().enumerate() {
-            // By name, so that a joint moves alike wherever the URDF names it.
+            // By name, so that a joint has the same motion at any place in the URDF.
             let own = name.bytes().map(f64::from).sum::<f64>() % 7.0 + seed as f64;
             for (size, hz) in [(0.5, 0.11 + 0.013 * own), (0.25, 0.37 + 0.029 * own)] {
                 let w = std::f64::consts::TAU * hz;
@@ -102,7 +102,7 @@ pub fn recording(
     }
 }
 
-/// The data of a fit of some recordings, standstills counted.
+/// Prepares some recordings for a fit, standstills included.
 pub fn problem(model: &Model, recordings: &[Recording]) -> Problem {
     let n = model.dof();
     let cutoff_hz = Problem::cutoff_hz(recordings);
@@ -116,7 +116,7 @@ pub fn problem(model: &Model, recordings: &[Recording]) -> Problem {
     Problem::new(model, recordings, tracks, cutoff_hz, &ones, &vec![true; n])
 }
 
-/// The data of two recordings of the small arm, `add` beside white noise of 0.05 N m.
+/// Prepares two recordings of the small arm, changed by `add`, with white noise of 0.05 N m.
 pub fn problem_with(seed: u64, mut add: impl FnMut(&[f64], &[f64], &mut [f64])) -> Problem {
     let model = model();
     let mut noise = Noise(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
@@ -133,7 +133,7 @@ pub fn problem_with(seed: u64, mut add: impl FnMut(&[f64], &[f64], &mut [f64])) 
     problem(&model, &recordings)
 }
 
-/// A finding of that effect at the first joint, without words.
+/// Returns a finding of an effect at the first joint, without texts.
 pub fn finding(effect: &str) -> Finding {
     Finding {
         effect: effect.to_owned(),

@@ -5,7 +5,7 @@ mod data;
 mod explain;
 mod fit;
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#[allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 mod fixture;
 mod inference;
 mod measure;

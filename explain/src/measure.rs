@@ -1,9 +1,10 @@
-//! The same numbers every night, whether anything is found or not: friction, offset and gain of each joint, the mass on
-//! the tool, and the play of a gear where there is one.
+//! Estimation of a fixed set of parameters every night: friction, offset and gain of each joint, the mass on the
+//! tool, and the backlash of a gear that has any.
 //!
-//! An explanation names what is certain and leaves out what is not, so its numbers come and go. What is followed over
-//! weeks needs one set of numbers with intervals. This fits all effects that [`is_followed`] at once, beside the corrected
-//! twin that the input starts from, as Swevers, Verdonck and De Schutter 2007 do it with a fixed set of parameters: see
+//! An explanation contains only certain effects, so its parameters differ from night to night. A time series over
+//! weeks needs the same parameters with intervals every night. Therefore all effects that [`is_followed`] are fitted
+//! at once, in addition to the corrected twin that the input starts from. Swevers, Verdonck and De Schutter 2007 fit
+//! a fixed set of parameters in the same way: see [`estimated`].
 //! [`estimated`].
 //!
 //! [`is_followed`]: tauscope_dynamics::terms::Traits::is_followed
@@ -23,37 +24,37 @@ use crate::read::audit;
 use crate::read::input::Input;
 use crate::read::recording::Recording;
 
-/// A joint is measured if at least this many of its rows are compared.
-/// Resolution: ten for each of its numbers.
+/// Smallest number of compared rows of a joint that is measured.
+/// Resolution: ten for each of its parameters.
 const LEAST_ROWS: f64 = 40.0;
-/// A gain that is not known better than this is not told.
-/// Resolution: a gravity or an inertia that hardly shows tells nothing of a gain.
+/// Largest half width of the 95 % interval of a reported gain, relative to its value.
+/// Resolution: gravity or inertia that hardly contributes to the effort does not determine a gain.
 const LEAST_KNOWN_GAIN: f64 = 0.5;
 
-/// A number with its interval.
+/// A parameter with its interval.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Number {
-    /// The joint's index; `None` for what belongs to the whole arm.
+    /// Index of the joint; `None` for a parameter of the whole arm.
     pub joint: Option<usize>,
     /// Canonical name of the parameter, with its unit.
     pub name: &'static str,
-    /// The twin's own and what it lacks.
+    /// Value: that of the twin plus the estimated correction.
     pub value: f64,
     /// The 95 % interval.
     pub interval: [f64; 2],
 }
 
-/// What was measured.
+/// The parameters of one night.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// The numbers, joint by joint.
+    /// The parameters, joint by joint.
     pub numbers: Vec<Number>,
-    /// By joint, whether its efforts are in N m. Otherwise they are in A, although the names of numbers say N m: nobody knows
-    /// its torque constant.
+    /// Whether a joint's efforts are in N m, by joint. Otherwise they are in A, although the names of parameters say
+    /// N m, because its torque constant is unknown.
     pub in_nm: Vec<bool>,
 }
 
-/// Measures. `Ok(Err(reason))` where the recordings allow no numbers.
+/// Estimates the parameters. `Ok(Err(reason))` if the recordings do not allow it.
 ///
 /// # Errors
 /// If a term of the start cannot be built for the robot.
@@ -63,7 +64,9 @@ pub fn measure(input: &Input) -> Result<Result<Measured, String>, TermError> {
         return Ok(Err(format!("recording {} holds no effort", recording.name)));
     }
     if audit::at_rest(input) {
-        return Ok(Err("no joint moves, so no friction can be told".to_owned()));
+        return Ok(Err(
+            "no joint moves, so friction cannot be estimated".to_owned()
+        ));
     }
     let constants = (input.torque_constants_nm_per_a.clone()).unwrap_or_else(|| vec![1.0; n]);
     let (unit_nm, unscaled) = scales(input, &constants, false);
@@ -104,7 +107,7 @@ pub fn measure(input: &Input) -> Result<Result<Measured, String>, TermError> {
     Ok(Ok(Measured { numbers, in_nm }))
 }
 
-/// The effects that are followed, at the joints that move.
+/// Returns the followed effects at the joints that move.
 fn followed(context: &Context<'_>, moves: &[bool]) -> Vec<Hypothesis> {
     let mut all = context.hypotheses();
     all.retain(|one| {
@@ -114,7 +117,7 @@ fn followed(context: &Context<'_>, moves: &[bool]) -> Vec<Hypothesis> {
     all
 }
 
-/// A gain for each joint that moves and whose bodies are known.
+/// Returns a gain for each joint that moves and whose bodies are known.
 fn gains(context: &Context<'_>, moves: &[bool]) -> Vec<Active> {
     if !context.input.bodies {
         return unknown_scales(&context.unscaled);
@@ -133,7 +136,7 @@ fn gains(context: &Context<'_>, moves: &[bool]) -> Vec<Active> {
     )
 }
 
-/// All numbers of a fit, the twin's own added.
+/// Returns all parameters of a fit, each added to that of the twin.
 fn numbers(context: &Context<'_>, problem: &Problem, estimated: &Estimated) -> Vec<Number> {
     let Estimated { fit, covariance } = estimated;
     let own = of_twin(context, problem);
@@ -144,7 +147,7 @@ fn numbers(context: &Context<'_>, problem: &Problem, estimated: &Estimated) -> V
             let at_joint = effect.place == PlaceKind::Joint;
             at_joint.then_some(active.hypothesis.place.joint)
         });
-        // One number tells each effect: its first parameter.
+        // The first parameter represents the effect.
         let name = effect.parameters[0].name;
         let value = active.parameters()[0];
         let half = HALF_WIDTH_95 * parameter_deviations(problem, fit, covariance, index)[0];
@@ -166,7 +169,7 @@ fn numbers(context: &Context<'_>, problem: &Problem, estimated: &Estimated) -> V
     all
 }
 
-/// What the corrected twin has of the numbers itself, in their units.
+/// Returns the parameters that the corrected twin already contains, in their units.
 fn of_twin(
     context: &Context<'_>,
     problem: &Problem,
@@ -214,7 +217,7 @@ mod tests {
     use super::*;
     use crate::fixture::{Noise, model, recording};
 
-    /// Two recordings with this Coulomb friction at the elbow.
+    /// Simulates two recordings with this Coulomb friction at the elbow.
     fn night(seed: u64, coulomb_nm: f64) -> Input {
         let mut noise = Noise(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
         let mut add = |_: &[f64], qd: &[f64], effort: &mut [f64]| {

@@ -1,9 +1,9 @@
-//! Step 7, report: findings in words, with intervals and rivals, and the test on recordings held out.
+//! Step 7, report: findings as sentences, with intervals and alternatives, and the test on held-out recordings.
 //!
-//! In: the explanation of step 6. Out: a [`schema::Report`] (written as `report.json`), the same as a page
-//! (crate `tauscope-report`), the corrected twin, and its predictions for the recordings held out, which no number was fitted to
-//! (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 2009, section 7.2). Rivals that are
-//! as likely are reported with the motion that would separate them.
+//! In: the explanation of step 6. Out: a [`schema::Report`] (written as `report.json`), the same as a page (crate
+//! `tauscope-report`), the corrected twin, and its predictions for the held-out recordings, to which no parameter was
+//! fitted (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 2009, section 7.2). Equally
+//! likely alternatives are reported with the motion that would distinguish them.
 
 pub(crate) mod corrected_twin;
 pub(crate) mod findings;

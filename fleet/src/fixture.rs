@@ -5,7 +5,7 @@ use tauscope_publish::message::{
     RecordMessage, ResidualMessage, STATUS_VERSION, StatusMessage,
 };
 
-/// A free cell's status of the life `instance`, sent at `sent_s`.
+/// A status without a contact, of the publisher instance `instance`, sent at `sent_s`.
 pub fn status(instance: &str, sent_s: i64) -> StatusMessage {
     StatusMessage {
         version: STATUS_VERSION,
@@ -63,7 +63,7 @@ pub fn status(instance: &str, sent_s: i64) -> StatusMessage {
     }
 }
 
-/// A payload that nobody declared.
+/// An undeclared payload.
 pub fn change() -> ChangeMessage {
     ChangeMessage {
         effect: "payload".to_owned(),

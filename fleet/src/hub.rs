@@ -1,4 +1,4 @@
-//! The fleet host: one Zenoh session, one thread that keeps the wall, and snapshots for all who look.
+//! The fleet host: one Zenoh session, one thread that owns the wall, and snapshots for all readers.
 
 mod keeping;
 mod physics;
@@ -24,41 +24,41 @@ use crate::store::{Label, Note, Store, StoreError};
 use crate::wall::{Effect, Event, Now, Snapshot, Wall};
 use keeping::Keeping;
 
-/// How often those who look are told. Resolution: a person sees no more.
+/// Update interval of the snapshots. Resolution: a person sees no more.
 const SHOW_EVERY: Duration = Duration::from_millis(250);
-/// How often the wall's clock ticks. Resolution: a cell that is gone is known within 1 s.
+/// Period of the wall's clock. Resolution: a lost cell is detected within 1 s.
 const TICK: Duration = Duration::from_millis(250);
-/// How long a question to a cell may take.
+/// Timeout of a query to a cell.
 const ASK_WITHIN: Duration = Duration::from_secs(5);
-/// How long a cell has to take a command; it refuses by itself after 1 s.
+/// Timeout of a command to a cell; the cell itself rejects a command after 1 s.
 const COMMAND_WITHIN: Duration = Duration::from_secs(3);
 
-/// What a fleet host needs.
+/// Settings of a fleet host.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// Where the cells are met.
+    /// Zenoh endpoints through which the cells are reached.
     pub endpoints: ZenohEndpoints,
-    /// Cells that are expected: they are shown before they are there.
+    /// Expected cells, which are shown before they connect.
     pub expected: Vec<String>,
-    /// Where incidents and history are kept; `None` to keep none.
+    /// File of incidents and history; `None` to store none.
     pub store: Option<PathBuf>,
     /// The folder of the nightly tables of `tauscope physics`.
     pub physics: Option<PathBuf>,
 }
 
-/// Why there is no fleet host.
+/// An error of starting a fleet host.
 #[derive(Debug, thiserror::Error)]
 pub enum FleetError {
-    /// Zenoh cannot listen or connect.
+    /// A Zenoh session that cannot listen or connect.
     #[error(transparent)]
     Session(#[from] LinkError),
-    /// Zenoh does not take a key.
+    /// A key that Zenoh rejects.
     #[error("zenoh: {0}")]
     Zenoh(String),
-    /// Nothing can be kept.
+    /// A store that cannot be opened.
     #[error("cannot keep incidents: {0}")]
     Store(#[from] StoreError),
-    /// No thread.
+    /// A thread that cannot be started.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] std::io::Error),
 }
@@ -73,14 +73,14 @@ impl FleetError {
     }
 }
 
-/// What waits for the hub's thread.
+/// An item in the queue of the hub's thread.
 #[derive(Debug)]
 enum Mail {
     Event(Event),
     Deed(Deed),
 }
 
-/// A fleet host that works until it is dropped.
+/// A fleet host that runs until it is dropped.
 pub struct Hub {
     session: Session,
     mailbox: Arc<Mailbox<Mail>>,
@@ -92,7 +92,7 @@ pub struct Hub {
 }
 
 impl Hub {
-    /// Listens to the cells.
+    /// Starts listening to the cells.
     ///
     /// # Errors
     /// If the session or the file cannot be opened.
@@ -152,17 +152,17 @@ impl Hub {
         })
     }
 
-    /// All that is known now.
+    /// Returns the newest snapshot.
     pub fn snapshot(&self) -> Arc<Snapshot> {
         self.snapshots.borrow().clone()
     }
 
-    /// Snapshots as they come.
+    /// Returns a receiver of the snapshots.
     pub fn snapshots(&self) -> watch::Receiver<Arc<Snapshot>> {
         self.snapshots.clone()
     }
 
-    /// What is kept, if anything is.
+    /// Reads from the store. Returns `None` without a store.
     pub fn kept<T>(
         &self,
         read: impl FnOnce(&Store) -> Result<T, StoreError>,
@@ -173,7 +173,7 @@ impl Hub {
         Some(read(&store))
     }
 
-    /// The physics of a cell's arm over weeks, if its nightly numbers are followed.
+    /// Returns the physics of a cell's arm over weeks, if its nightly tables are read.
     pub fn physics(&self, cell: &str) -> Option<CellPhysics> {
         let known = self.physics.lock().unwrap_or_else(PoisonError::into_inner);
         known.iter().find(|physics| physics.cell == cell).cloned()
@@ -182,25 +182,25 @@ impl Hub {
     /// Sends a command to a cell, as `tauscope send` does, and waits for its answer.
     ///
     /// # Errors
-    /// If nobody answers there.
+    /// If the cell does not answer.
     pub fn send(&self, cell: &str, signed: &Signed) -> Result<Answer, AskError> {
         ask_signed(&self.session, cell, signed, COMMAND_WITHIN)
     }
 
-    /// Somebody has seen what is open at a cell.
+    /// Stores that a user has acknowledged the open incidents of a cell.
     pub fn acknowledged(&self, cell: &str, by: &str) {
         let (cell, by) = (cell.to_owned(), by.to_owned());
         self.mailbox
             .urgent(Mail::Deed(Deed::Acknowledged { cell, by }));
     }
 
-    /// Somebody notes something of a cell.
+    /// Stores a user's note on a cell.
     pub fn note(&self, cell: &str, note: Note) {
         let cell = cell.to_owned();
         self.mailbox.urgent(Mail::Deed(Deed::Noted { cell, note }));
     }
 
-    /// A cell has taken what somebody writes into its archive.
+    /// Stores a user's label that a cell has written to its archive.
     pub fn labelled(&self, cell: &str, label: Label) {
         let cell = cell.to_owned();
         self.mailbox
@@ -212,7 +212,7 @@ impl Drop for Hub {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A thread that panicked has said so.
+            // A panic has already been reported.
             let _ = thread.join();
         }
         // Nothing is left to be sent.
@@ -227,7 +227,7 @@ fn unix_ns() -> i64 {
     })
 }
 
-/// Hears tokens, statuses and records of all cells.
+/// Subscribes to the tokens, statuses and records of all cells.
 fn listen(session: &Session, mailbox: &Arc<Mailbox<Mail>>) -> Result<(), FleetError> {
     let tokens = mailbox.clone();
     session
@@ -263,10 +263,10 @@ fn listen(session: &Session, mailbox: &Arc<Mailbox<Mail>>) -> Result<(), FleetEr
     Ok(())
 }
 
-/// Reads an answer of a cell: key and payload, and when it was asked and came \[ns since the epoch\].
+/// Parser of a cell's answer: key, payload, and the times of the query and of the answer \[ns since the epoch\].
 type Read = fn(&str, &[u8], [i64; 2]) -> Vec<Event>;
 
-/// The thread's own.
+/// State of the hub's thread.
 struct Worker {
     session: Session,
     mailbox: Arc<Mailbox<Mail>>,
@@ -329,11 +329,11 @@ impl Worker {
             view.drift = own.and_then(|physics| physics.drift(snapshot.now_ns));
         }
         drop(known);
-        // Nobody may look right now.
+        // There may be no receiver now.
         self.show.send_replace(Arc::new(snapshot));
     }
 
-    /// Asks a cell for what was missed; the answer is mail.
+    /// Queries a cell for missing data; the answer goes to the mailbox.
     fn ask(&self, effect: &Effect) {
         let (selector, read): (String, Read) = match effect {
             Effect::AskStatus { cell } => (format!("{cell}/status"), |key, payload, _| {
@@ -372,7 +372,7 @@ impl Worker {
         }
     }
 
-    /// Sessions that this one is connected to.
+    /// Returns the number of connected Zenoh sessions.
     fn reached(&self) -> usize {
         let info = self.session.info();
         info.routers_zid().wait().count() + info.peers_zid().wait().count()

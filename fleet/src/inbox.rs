@@ -1,6 +1,7 @@
-//! Messages from the bus are untrusted: what is too long, not finite or none at all is refused, with the reason.
+//! Validation of messages from the bus, which are untrusted: a message that is too long, not finite or malformed is
+//! rejected with the reason.
 //!
-//! What passes is bounded: texts, lists and numbers. Nothing in here can panic, whatever the bytes.
+//! Texts, lists and numbers of accepted messages are bounded. No input causes a panic.
 
 use serde::de::DeserializeOwned;
 use tauscope_bus::clock::RoundTrip;
@@ -11,32 +12,36 @@ use tauscope_publish::message::{
 
 use crate::wall::Event;
 
-/// A status of 16 joints and a dozen stages has 4 kB. Resolution: ten times that.
+/// Maximum size of a status \[bytes\].
+/// Resolution: ten times the 4 kB of a status with 16 joints and a dozen stages.
 pub const MAX_STATUS_BYTES: usize = 64 * 1024;
-/// The answer with the 256 records that a publisher keeps. Resolution: 1 kB each and some.
+/// Maximum size of an answer with the 256 records that a publisher keeps \[bytes\].
+/// Resolution: 1 kB each and some.
 pub const MAX_RECORDS_BYTES: usize = 512 * 1024;
+/// Maximum length of a text \[bytes\].
 /// Resolution: names in samples have 48 bytes, hashes 64, paths more.
 const MAX_TEXT_BYTES: usize = 256;
+/// Maximum length of a list.
 /// Resolution: a cell has at most 16 joints and a dozen stages.
 const MAX_LIST: usize = 64;
 
-/// Why a message is refused: one word of few, which is counted.
+/// Reason why a message is rejected, one of a fixed set; messages are counted by reason.
 type Refusal = &'static str;
 
-/// The cell and the life of a liveliness token.
+/// Parses the key of a liveliness token. Returns the cell and the publisher instance.
 pub fn token(key: &str) -> Option<(String, String)> {
     let (cell, instance) = key.split_once("/@alive/")?;
     let sound = is_cell(cell) && is_text(instance) && !instance.contains('/');
     sound.then(|| (cell.to_owned(), instance.to_owned()))
 }
 
-/// What a status says.
+/// Parses a status.
 pub fn status(key: &str, payload: &[u8]) -> Event {
     let event = |(cell, status)| Event::Status { cell, status };
     status_of(key, payload).map_or_else(Event::Refused, event)
 }
 
-/// What the answer to a question for the status says.
+/// Parses the answer to a status query.
 pub fn answer(key: &str, payload: &[u8]) -> Event {
     let event = |(cell, status)| Event::Answer { cell, status };
     status_of(key, payload).map_or_else(Event::Refused, event)
@@ -49,8 +54,8 @@ fn status_of(key: &str, payload: &[u8]) -> Result<(String, Box<StatusMessage>), 
     Ok((cell, Box::new(status)))
 }
 
-/// What an answer to a question for the clock says, which was asked and came back at these times \[ns since the epoch\].
-/// A cell that does not know the question answers with its status, which says nothing of it.
+/// Parses the answer to a clock query, given the times of the query and of the answer \[ns since the epoch\]. A cell
+/// that does not know the query answers with its status, for which this returns `None`.
 pub fn clock(key: &str, payload: &[u8], asked_ns: i64, back_ns: i64) -> Option<Event> {
     let event = |cell: String| {
         let clock: ClockMessage = read(payload, MAX_STATUS_BYTES)?;
@@ -77,7 +82,7 @@ pub fn clock(key: &str, payload: &[u8], asked_ns: i64, back_ns: i64) -> Option<E
     }
 }
 
-/// What a record says.
+/// Parses a record.
 pub fn record(key: &str, payload: &[u8]) -> Event {
     let event = |cell: String| {
         let record: RecordMessage = read(payload, MAX_STATUS_BYTES)?;
@@ -90,7 +95,7 @@ pub fn record(key: &str, payload: &[u8]) -> Event {
         .unwrap_or_else(Event::Refused)
 }
 
-/// What the answer to a question for missing records says.
+/// Parses the answer to a query for missing records.
 pub fn records(key: &str, payload: &[u8]) -> Vec<Event> {
     let cell = match cell_of(key, "/records") {
         Ok(cell) => cell,
@@ -121,7 +126,7 @@ fn cell_of(key: &str, topic: &str) -> Result<String, Refusal> {
     cell.map(str::to_owned).ok_or("name of a cell that is none")
 }
 
-/// Names in pipeline files are such.
+/// Returns whether `name` is a valid cell name, as in pipeline files.
 pub fn is_cell(name: &str) -> bool {
     let sound = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     !name.is_empty() && name.len() <= 64 && name.chars().all(sound)
@@ -223,7 +228,7 @@ fn is_text(text: &str) -> bool {
 }
 
 fn all_finite<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> Result<(), Refusal> {
-    // What is far beyond any robot would make nonsense of sums.
+    // Values far beyond any robot would corrupt sums.
     let sound = |number: &&f64| number.is_finite() && number.abs() < 1e12;
     let all = numbers.into_iter().all(|number| sound(&number));
     all.then_some(()).ok_or("number beyond reason")
@@ -317,7 +322,7 @@ mod tests {
         assert_eq!((offset.ahead_ns, offset.uncertainty_ns), (4_000, 10));
         assert_eq!(refused(answer(5_010, 5_000)), "times that cannot be");
         assert_eq!(refused(answer(0, i64::MAX)), "times that cannot be");
-        // A cell of an older version knows no such question.
+        // A cell of an older version does not know this query.
         let status = serde_json::to_vec(&fixture::status("a1", 5)).unwrap();
         assert_eq!(clock("c/status", &status, 0, 1), None);
         let none = clock("c/status", b"{}", 0, 1).unwrap();

@@ -1,4 +1,4 @@
-//! From what the wall says to what is kept: incidents, contacts, minutes of the residual.
+//! Conversion of the wall's effects to stored incidents, contacts and minutes of the residual.
 
 #[cfg(test)]
 mod tests;
@@ -16,11 +16,11 @@ const HOUR_NS: i64 = 60 * MINUTE_NS;
 const DAY_NS: i64 = 24 * HOUR_NS;
 /// Days of the curve on a tile. Resolution: six weeks, in which a gear wears.
 const TREND_DAYS: i64 = 42;
-/// What a cell tells of a time longer ago, or of one to come, is of a clock that is wrong \[ns\].
+/// Maximum age of a record; the clock of an older or a future record is treated as wrong \[ns\].
 /// Resolution: a fleet host may be away for the longest holidays.
 const LATEST_NS: i64 = 30 * DAY_NS;
 
-/// Keeps what happens to the cells.
+/// Writer of the cells' events to the store.
 #[derive(Debug)]
 pub struct Keeper {
     store: Store,
@@ -30,40 +30,40 @@ pub struct Keeper {
     aging: Aging,
 }
 
-/// When a record was told, and when it came \[ns since the epoch\].
+/// Send and receive time of a record \[ns since the epoch\].
 #[derive(Debug, Clone, Copy)]
 struct Came {
     told_ns: i64,
     now_ns: i64,
 }
 
-/// What somebody does on the page.
+/// Action of a user on the page.
 #[derive(Debug)]
 pub enum Deed {
-    /// What is open at a cell was seen.
+    /// The open incidents of a cell were acknowledged.
     Acknowledged {
         /// The cell.
         cell: String,
-        /// Who.
+        /// The user.
         by: String,
     },
-    /// Something was noted.
+    /// A note was written.
     Noted {
         /// The cell.
         cell: String,
-        /// What, and who.
+        /// Text and user.
         note: Note,
     },
-    /// A cell has taken a label into its archive.
+    /// A cell has written a label to its archive.
     Labelled {
         /// The cell.
         cell: String,
-        /// What, and who.
+        /// Text and user.
         label: Label,
     },
 }
 
-/// What is normal for a cell, and how its residual went by day, as a share of that.
+/// Normal residual of a cell, and its residual by day relative to that.
 #[derive(Debug, Default)]
 struct Normal {
     joints: Vec<JointNormal>,
@@ -71,7 +71,7 @@ struct Normal {
 }
 
 impl Keeper {
-    /// Keeps it in this file.
+    /// Creates a keeper that writes to `store`.
     pub fn new(store: Store) -> Self {
         Self {
             store,
@@ -82,12 +82,12 @@ impl Keeper {
         }
     }
 
-    /// The file.
+    /// Returns the store.
     pub fn store(&self) -> &Store {
         &self.store
     }
 
-    /// The cells of earlier lives of this host.
+    /// Returns the cells of earlier runs of this host.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -95,7 +95,7 @@ impl Keeper {
         self.store.cells()
     }
 
-    /// Keeps what the wall says at `now_ns`.
+    /// Stores an effect of the wall at `now_ns`.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -121,10 +121,10 @@ impl Keeper {
                 let late_ns = now_ns.saturating_sub(*told_ns);
                 let is_right = (0..LATEST_NS).contains(&late_ns);
                 let told_ns = if is_right { *told_ns } else { now_ns };
-                // A contact that is kept without its incident would never be told of again.
+                // A contact stored without its incident would never be reported again.
                 self.store.at_once(|store| {
                     if !store.hear(cell, instance, *number, now_ns)? {
-                        // A host that was started again asks for all that a cell keeps.
+                        // A restarted host queries all records that a cell keeps.
                         return Ok(());
                     }
                     match &**record {
@@ -149,7 +149,7 @@ impl Keeper {
                     words: format!("{samples} samples lost before `{stage}`"),
                     at_ns: now_ns,
                 })?;
-                // A loss is over when it is told.
+                // A loss is over when it is reported.
                 self.store.close(cell, Kind::Loss, stage, now_ns)
             }
             Effect::AskRecords { .. } | Effect::AskStatus { .. } | Effect::AskClock { .. } => {
@@ -158,7 +158,7 @@ impl Keeper {
         }
     }
 
-    /// Keeps what somebody has done at `at_ns`.
+    /// Stores a user's action at `at_ns`.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -168,7 +168,7 @@ impl Keeper {
             Deed::Labelled { cell, label } => self.store.label(cell, label),
             Deed::Noted { cell, note } => {
                 self.store.note(cell, note)?;
-                // The note is kept, and what is normal is read again within the hour.
+                // The note is stored, and the normal residual is read again within the hour.
                 let _ = self.learn(std::iter::once(cell.as_str()), at_ns);
                 Ok(())
             }
@@ -188,7 +188,7 @@ impl Keeper {
             _ => self.store.ended(cell, None)?,
         }
         match now {
-            // On its way to something else.
+            // A transitional state.
             State::Unknown { why } if why != UnknownWhy::TwoPublishers => Ok(()),
             State::Stale { .. } | State::Unknown { .. } => {
                 let news = silence(cell, now, now_ns);
@@ -237,7 +237,7 @@ impl Keeper {
         let archive = status.and_then(|status| status.archive.as_deref());
         let said = (self.store).contact(cell, instance, contact, host, archive, now_ns)?;
         let is_newest = self.store.is_newest(cell, instance, contact)?;
-        // Of the incident that contacts of a while share, the newest says how it stands.
+        // Contacts within ten minutes share an incident, whose state follows the newest one.
         if said == Said::Nothing || (said == Said::More && !is_newest) {
             return Ok(());
         }
@@ -247,7 +247,7 @@ impl Keeper {
         {
             text += &format!(" ({})", words::change(change, &status.effort_unit));
         }
-        // Contacts of ten minutes are one incident, wherever they are: the link is only sure when one has ended.
+        // Contacts within ten minutes are one incident at any link: the link is certain only after the contact.
         let place = contact.detector.clone();
         let news = News {
             cell: cell.to_owned(),
@@ -280,7 +280,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// Keeps what is due by the clock: minutes, and once an hour what is normal.
+    /// Does the periodic work: stores minutes, and once an hour updates the normal residuals.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -288,7 +288,7 @@ impl Keeper {
         let now_ns = snapshot.now_ns;
         let (minute, hour) = (now_ns / MINUTE_NS, now_ns / HOUR_NS);
         if minute != self.minute {
-            // The first minute is not whole.
+            // The first minute is incomplete.
             let first = self.minute == 0;
             self.minute = minute;
             if !first {
@@ -303,7 +303,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// Reads again what is normal for these cells.
+    /// Reads the normal residuals of these cells again.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -331,7 +331,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// Puts what is normal for the cells into a snapshot.
+    /// Adds the normal residuals of the cells to a snapshot.
     pub fn compare(&self, snapshot: &mut Snapshot) {
         for view in &mut snapshot.cells {
             let Some(normal) = self.normals.get(&view.cell) else {

@@ -1,4 +1,4 @@
-//! All cells at once: what each one tells, how fresh that is, its incidents, a page and metrics.
+//! Monitoring of all cells: their status with its age, their incidents, a page and metrics.
 
 #[cfg(test)]
 mod fixture;

@@ -1,13 +1,14 @@
-//! What waits for the hub: bounded, and what tells of life and death is not held up by the rest.
+//! The bounded queue of the hub. Liveliness tokens and user actions are urgent, so other messages do not delay them.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+/// Maximum number of items of each class.
 /// Resolution: five statuses of a thousand cells.
 const MAX_WAITING: usize = 8192;
 
-/// A queue with a first and a second class.
+/// A queue with an urgent and an ordinary class.
 #[derive(Debug)]
 pub struct Mailbox<T> {
     queues: Mutex<Queues<T>>,
@@ -35,12 +36,12 @@ impl<T> Default for Mailbox<T> {
 }
 
 impl<T> Mailbox<T> {
-    /// Puts something in that goes first.
+    /// Adds an urgent item.
     pub fn urgent(&self, item: T) {
         self.put(item, |queues| &mut queues.urgent);
     }
 
-    /// Puts something in.
+    /// Adds an ordinary item.
     pub fn ordinary(&self, item: T) {
         self.put(item, |queues| &mut queues.ordinary);
     }
@@ -56,7 +57,8 @@ impl<T> Mailbox<T> {
         self.arrived.notify_one();
     }
 
-    /// What has come, at the latest after `patience`, and how many found no room since the last time.
+    /// Waits at most `patience` for items. Returns all items, urgent ones first, and the number dropped since the
+    /// last call.
     pub fn take(&self, patience: Duration) -> (Vec<T>, u64) {
         let queues = self.lock();
         let empty = |queues: &mut Queues<T>| queues.urgent.is_empty() && queues.ordinary.is_empty();
@@ -68,7 +70,7 @@ impl<T> Mailbox<T> {
         (all, overflowed)
     }
 
-    // Each queue is whole at any time, so a panic elsewhere does not matter.
+    // Each queue is consistent at any time, so a poisoned lock is harmless.
     fn lock(&self) -> MutexGuard<'_, Queues<T>> {
         self.queues.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -1,7 +1,7 @@
-//! The physics of all arms over weeks: the nightly tables of `tauscope physics`, read back and judged.
+//! The physics of all arms over weeks, evaluated from the nightly tables of `tauscope physics`.
 //!
-//! The folder has a table a night: `cell=CELL/date=YYYY-MM-DD/physics*.parquet`, a row for each number. History belongs to
-//! the arm: an arm that moves to another cell takes its series with it.
+//! The folder has a table for each night, `cell=CELL/date=YYYY-MM-DD/physics*.parquet`, with a row for each number.
+//! History belongs to the arm: an arm that moves to another cell takes its series with it.
 
 mod table;
 
@@ -16,37 +16,37 @@ use tauscope_condition::{Cause, Estimate, Finding, Quantity, Series, assess, pee
 pub use table::{Column, Row, TABLE, TextColumn, folder_of};
 
 const NS_A_DAY: f64 = 86_400e9;
-/// Nights whose median is the state now. Resolution: a week has each day's work once.
+/// Number of newest nights whose median is the current level. Resolution: a week has each day's work once.
 const NEWEST: usize = 7;
-/// Nights whose median is the state at first, the same as are learned.
+/// Number of first nights whose median is the initial level; equal to the number of learned nights.
 const FIRST: usize = tauscope_condition::series::LEARNED;
-/// Numbers whose newest night is older are stale \[days\]. Resolution: a long weekend on which no cell works.
+/// Age of the newest night above which numbers are stale \[days\]. Resolution: a long weekend on which no cell works.
 const STALE_AFTER_D: f64 = 4.0;
-/// Days of a curve on the wall. Resolution: six weeks, in which a gear wears.
+/// Length of a curve on the wall \[days\]. Resolution: six weeks, in which a gear wears.
 const CURVE_D: f64 = 42.0;
 
-/// Why the tables cannot be read.
+/// An error of reading the tables.
 #[derive(Debug, thiserror::Error)]
 pub enum PhysicsError {
-    /// The file system says no.
+    /// An I/O error.
     #[error("cannot read {path}: {source}")]
     Read {
         /// The folder or file.
         path: PathBuf,
-        /// Why.
+        /// The operating system's error.
         source: std::io::Error,
     },
-    /// It is no table of nightly physics.
+    /// A file that is not a table of nightly physics.
     #[error("{path} is no table of nightly physics: {reason}")]
     Table {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Reason.
         reason: String,
     },
 }
 
-/// One number's series, and where it stands.
+/// The series of one number, with its levels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Followed {
     /// The series.
@@ -58,30 +58,30 @@ pub struct Followed {
     pub first: f64,
     /// Median of the newest nights.
     pub now: f64,
-    /// The same number's median in arms of the same robot, where there are enough.
+    /// Median of this number over the other arms of the same robot, if there are enough.
     pub peers_median: Option<f64>,
     /// Whether it is an outlier among them.
     pub is_outlier: bool,
-    /// What fewer estimates than a month say.
+    /// Preliminary result, while there are fewer estimates than a month.
     pub so_far: Option<SoFar>,
 }
 
-/// The joint that drifts most.
+/// The largest drift of friction in an arm.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Drift {
     /// The joint.
     pub joint: String,
     /// The friction that drifts.
     pub quantity: Quantity,
-    /// Its change since the baseline, as a share.
+    /// Its relative change since the baseline.
     pub share: f64,
-    /// The last six weeks, as shares of the baseline.
+    /// The last six weeks, relative to the baseline.
     pub curve: Vec<f64>,
-    /// What is found of the arm, if anything is.
+    /// The alarm for the arm, if any.
     pub finding: Option<String>,
-    /// Whether the change is warmth.
+    /// Whether the change is explained by temperature.
     pub is_warmth: bool,
-    /// How old the newest night is, where it is so old that this says nothing of now \[days\].
+    /// Age of the newest night, if it is stale \[days\].
     pub stale_d: Option<u32>,
 }
 
@@ -98,14 +98,14 @@ pub struct CellPhysics {
     pub twin_sha256: String,
     /// The newest night \[days since 1970-01-01 UTC\].
     pub newest_day: f64,
-    /// What was found, the newest first.
+    /// The findings, newest first.
     pub findings: Vec<Finding>,
     /// All series.
     pub followed: Vec<Followed>,
 }
 
-/// Reads the tables of all cells under `folder` since a day; those that cannot be read are left out and told.
-/// `baselines` are the days of a cell's maintenance notes that begin a new baseline.
+/// Reads the tables of all cells under `folder` since a day. Tables that cannot be read are skipped, and their errors
+/// are returned. `baselines` returns the days of a cell's maintenance notes that begin a new baseline.
 ///
 /// # Errors
 /// If the folder cannot be read.
@@ -116,7 +116,7 @@ pub fn read(
 ) -> Result<(Vec<CellPhysics>, Vec<PhysicsError>), PhysicsError> {
     let (rows, unread) = table::rows(folder, since_day)?;
     let mut by_arm: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
-    // The newest night tells which arm is in a cell.
+    // The newest night determines which arm is in a cell.
     let mut newest: BTreeMap<&str, &Row> = BTreeMap::new();
     for row in &rows {
         by_arm.entry(&row.arm).or_default().push(row);
@@ -183,7 +183,7 @@ fn followed(series: Series, unit: &str, since: f64) -> Followed {
     }
 }
 
-/// Compares each number with the same one of the other arms of that robot.
+/// Compares each number with that of the other arms of the same robot.
 fn beside_peers(cells: &mut [CellPhysics]) {
     let key = |cell: &CellPhysics, one: &Followed| {
         (
@@ -220,26 +220,26 @@ fn beside_peers(cells: &mut [CellPhysics]) {
 }
 
 impl CellPhysics {
-    /// Whether something is found of this number.
+    /// Returns whether there is a finding on this number.
     pub fn is_found(&self, one: &Followed) -> bool {
         let series = &one.series;
         let of = |found: &Finding| found.quantity == series.quantity && found.joint == series.joint;
         self.findings.iter().any(of)
     }
 
-    /// How old the newest night is at `now_ns` \[days\].
+    /// Returns the age of the newest night at `now_ns` \[days\].
     pub fn age_d(&self, now_ns: i64) -> u32 {
         (now_ns as f64 / NS_A_DAY - self.newest_day).max(0.0) as u32
     }
 
-    /// The same, where it is so old that the numbers say nothing of now.
+    /// Returns the age of the newest night at `now_ns` \[days\], if the numbers are stale.
     pub fn stale_d(&self, now_ns: i64) -> Option<u32> {
         let is_stale = now_ns as f64 / NS_A_DAY - self.newest_day > STALE_AFTER_D;
         is_stale.then(|| self.age_d(now_ns))
     }
 
-    /// The joint whose friction has changed most: one that is found first. `now_ns`: when it is asked \[ns since the
-    /// epoch\].
+    /// Returns the joint whose friction has changed most at `now_ns` \[ns since the epoch\]. A joint with an alarm
+    /// takes precedence.
     pub fn drift(&self, now_ns: i64) -> Option<Drift> {
         let found = self
             .findings

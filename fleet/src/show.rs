@@ -5,7 +5,7 @@ use comfy_table::{Table, presets};
 use crate::wall::{CellView, Snapshot, State};
 use crate::words;
 
-/// Clocks that are named above the table. Resolution: more of them are one fault, this host's own clock.
+/// Maximum number of clocks named above the table. Resolution: more of them are one fault, this host's own clock.
 const MOST_CLOCKS: usize = 3;
 
 /// All cells as a table, under a line that sums them up.
@@ -36,7 +36,7 @@ pub fn table(snapshot: &Snapshot) -> String {
     text
 }
 
-/// How many cells are in which state, and what is wrong with the fleet host itself.
+/// Summarizes the number of cells in each state, and the faults of the fleet host itself.
 pub fn summary(snapshot: &Snapshot) -> String {
     let all = snapshot.cells.len();
     let counts = State::NAMES.iter().filter_map(|name| {

@@ -1,6 +1,6 @@
-//! What a fleet host keeps: contacts, incidents, the residual over weeks, notes. A file of SQLite.
+//! SQLite store of a fleet host: contacts, incidents, the residual over weeks, notes.
 //!
-//! All times are ns since the epoch. What is older than [`KEPT_NS`] is removed once an hour.
+//! All times are in ns since the epoch. Data older than [`KEPT_NS`] are removed once an hour.
 
 mod cells;
 mod clock;
@@ -24,11 +24,11 @@ pub use incidents::{Incident, Kind, News};
 pub use labels::{KeptLabel, Label};
 pub use notes::{Note, baselines};
 
-/// How long contacts, incidents and history are kept \[ns\]. Resolution: a year and some, to compare seasons.
+/// Retention time of contacts, incidents and history \[ns\]. Resolution: a year and some, to compare seasons.
 pub const KEPT_NS: i64 = 400 * 86_400_000_000_000;
-/// How long is waited for somebody else who holds the file.
+/// Longest wait for another program that holds the file.
 const WAIT: Duration = Duration::from_secs(2);
-/// Version of the tables. A file of another version is refused.
+/// Version of the tables. A file of another version is rejected.
 const VERSION: i64 = 1;
 
 const TABLES: &str = "
@@ -57,18 +57,18 @@ const TABLES: &str = "
     CREATE INDEX notes_by_cell ON notes (cell, at_ns);
 ";
 
-/// Why nothing can be kept.
+/// An error of the store.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// SQLite says no.
+    /// An error of SQLite.
     #[error("{path}: {source}{}", remedy(source))]
     Sqlite {
         /// The file.
         path: PathBuf,
-        /// What it says.
+        /// SQLite's error.
         source: rusqlite::Error,
     },
-    /// It holds other tables.
+    /// A file with tables of another version.
     #[error("{path} has the version {found}, this program reads {VERSION}; give another file")]
     Version {
         /// The file.
@@ -78,7 +78,7 @@ pub enum StoreError {
     },
 }
 
-/// What may be done about it, behind what SQLite says.
+/// Returns the remedy that follows SQLite's error message.
 fn remedy(error: &rusqlite::Error) -> &'static str {
     use rusqlite::ErrorCode as Code;
     match error.sqlite_error_code() {
@@ -95,7 +95,7 @@ fn remedy(error: &rusqlite::Error) -> &'static str {
     }
 }
 
-/// The file.
+/// An open store.
 #[derive(Debug)]
 pub struct Store {
     connection: Connection,
@@ -103,10 +103,10 @@ pub struct Store {
 }
 
 impl Store {
-    /// Opens the file, or makes it.
+    /// Opens the file, and creates it if necessary.
     ///
     /// # Errors
-    /// If it cannot be opened, or is none of ours.
+    /// If it cannot be opened, or is not a store of a fleet host.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         let failed = |source| StoreError::Sqlite {
             path: path.to_owned(),
@@ -153,7 +153,7 @@ impl Store {
         })
     }
 
-    /// The same file once more, for another thread.
+    /// Opens the file again, for another thread.
     ///
     /// # Errors
     /// If it cannot be opened.
@@ -161,20 +161,20 @@ impl Store {
         Self::open(&self.path)
     }
 
-    /// Where it is.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether it is waited for somebody else who holds the file; it is at first.
+    /// Sets whether to wait for another program that holds the file. The default is to wait.
     pub fn waits_for_others(&self, waits: bool) {
-        // It only sets a number, and fails for none.
+        // This only sets a number, and does not fail.
         let _ = self
             .connection
             .busy_timeout(if waits { WAIT } else { Duration::ZERO });
     }
 
-    /// Holds the file against all others.
+    /// Locks the file exclusively.
     ///
     /// # Errors
     /// If SQLite refuses.
@@ -184,7 +184,7 @@ impl Store {
         held.map_err(|error| self.failed(error))
     }
 
-    /// Lets it go.
+    /// Releases the lock.
     ///
     /// # Errors
     /// If SQLite refuses.
@@ -194,7 +194,7 @@ impl Store {
         released.map_err(|error| self.failed(error))
     }
 
-    /// Looks whether the file can be written.
+    /// Checks that the file can be written.
     ///
     /// # Errors
     /// If it cannot.
@@ -208,7 +208,7 @@ impl Store {
         StoreError::Sqlite { path, source }
     }
 
-    /// Removes what is older than it is kept.
+    /// Removes data older than the retention time.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -232,15 +232,15 @@ impl Store {
         Ok(())
     }
 
-    /// Does `work` as one transaction: all of it is kept, or nothing.
+    /// Runs `work` as one transaction: all of it is stored, or nothing.
     ///
     /// # Errors
-    /// What `work` says, or if the file cannot be written.
+    /// The error of `work`, or if the file cannot be written.
     pub fn at_once(
         &self,
         work: impl FnOnce(&Self) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
-        // One that begins by reading could not wait for somebody else who writes meanwhile.
+        // A transaction that begins with a read could not wait for another writer.
         let begin = TransactionBehavior::Immediate;
         let transaction = Transaction::new_unchecked(&self.connection, begin)
             .map_err(|error| self.failed(error))?;

@@ -1,8 +1,8 @@
-//! The wall: what is known of each cell, how fresh that is, and what follows from it.
+//! The wall: the state of each cell and the age of its data.
 //!
-//! A pure state machine. In go tokens, statuses and records of cells and the ticks of a clock; out come what somebody
-//! has to do, and [`Snapshot`]s. A cell is [`State::Running`] only while its token is there, its status is fresh, samples
-//! arrive and a detector judges them.
+//! A pure state machine. Its inputs are tokens, statuses and records of cells and the ticks of a clock; its outputs
+//! are [`Effect`]s and [`Snapshot`]s. A cell is [`State::Running`] only while its token exists, its status is fresh,
+//! samples arrive and a detector evaluates them.
 
 mod cell;
 mod latch;
@@ -22,120 +22,121 @@ use cell::Watched;
 pub use snapshot::{CellView, ResidualView, Snapshot, Totals};
 pub use state::{Severity, StaleWhy, State, UnknownWhy};
 
+/// Maximum number of cells.
 /// Resolution: ten times the thousand cells that a host is meant for.
 pub const MAX_CELLS: usize = 10_000;
-/// For so long after its token went, the last status of a cell may still come \[ms\].
-/// Resolution: both leave the cell together; one that was killed is still known within half a second.
+/// Grace period after the loss of a token in which the last status of the cell may still arrive \[ms\].
+/// Resolution: both leave the cell together; a killed cell is still reported within half a second.
 pub const PARTING_MS: u64 = 200;
-/// A status comes once a second: three that are missing are a silence \[ms\].
-/// Resolution: a pause of a busy host is shorter, and what is cut off is known within 5 s.
+/// Age of the newest status above which a cell is stale: three missing statuses at one per second \[ms\].
+/// Resolution: a pause of a busy host is shorter, and a disconnected cell is reported within 5 s.
 pub const STALE_AFTER_MS: u64 = 3_500;
-/// So long after its start a fleet host calls a cell of an earlier life lost that is not there \[ms\].
-/// Resolution: tokens and statuses are there within seconds of the connection.
+/// Grace period after start before a known but absent cell is reported as lost \[ms\].
+/// Resolution: tokens and statuses arrive within seconds of the connection.
 pub const BACK_AFTER_MS: u64 = 10_000;
-/// Clocks that differ by more are told of \[ns\].
-/// Resolution: who lays the records of two cells side by side reads tenths of a second.
+/// Clock offset above which the fleet page shows a warning \[ns\].
+/// Resolution: records of two cells are compared to tenths of a second.
 pub const CLOCK_LIMIT_NS: i64 = 100_000_000;
 
-/// A time by two clocks: one that only runs, to judge ages by, and one that people read.
+/// A time by two clocks: a monotonic one for ages, and the system clock for display.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Now {
-    /// Since the fleet host started \[ms\].
+    /// Monotonic time since the fleet host started \[ms\].
     pub running_ms: u64,
-    /// By the clock of the fleet host \[ns since the epoch\].
+    /// Time by the clock of the fleet host \[ns since the epoch\].
     pub unix_ns: i64,
 }
 
-/// What the wall is told.
+/// An input of the wall.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
-    /// A publisher of the cell lives: its token is there.
+    /// A publisher of the cell is connected: its token exists.
     Alive {
         /// The cell.
         cell: String,
-        /// The publisher's life.
+        /// The publisher instance.
         instance: String,
     },
-    /// It does not live any more.
+    /// A publisher of the cell is disconnected: its token is lost.
     Gone {
         /// The cell.
         cell: String,
-        /// The publisher's life.
+        /// The publisher instance.
         instance: String,
     },
-    /// How a cell fares.
+    /// A periodic status of a cell.
     Status {
         /// The cell.
         cell: String,
-        /// What it says.
+        /// The status.
         status: Box<StatusMessage>,
     },
-    /// How a cell fares, or fared, when it was asked: the answer may come behind what it has said since.
+    /// The answer to a status query. It may arrive after a newer periodic status.
     Answer {
         /// The cell.
         cell: String,
-        /// What it says.
+        /// The status.
         status: Box<StatusMessage>,
     },
     /// A contact or a change of the arm.
     Record {
         /// The cell.
         cell: String,
-        /// What it says.
+        /// The record.
         record: Box<RecordMessage>,
     },
     /// The cell has answered with all records that it keeps, up to this number.
     AllRecords {
         /// The cell.
         cell: String,
-        /// The publisher's life.
+        /// The publisher instance.
         instance: String,
         /// The last number.
         number: u64,
     },
-    /// The cell has answered what its clock says.
+    /// The cell has answered a clock query.
     Clock {
         /// The cell.
         cell: String,
-        /// The publisher's life.
+        /// The publisher instance.
         instance: String,
-        /// How far it is ahead of this host's.
+        /// Offset of its clock from this host's.
         offset: Offset,
     },
-    /// A message that is none, and why.
+    /// A message that was rejected, with the reason.
     Refused(&'static str),
-    /// So many Zenoh sessions are reached.
+    /// Number of connected Zenoh sessions.
     Reached(usize),
 }
 
-/// What somebody has to do.
+/// An output of the wall: something to store, or a query to send.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
     /// The state of a cell has changed.
     Changed {
         /// The cell.
         cell: String,
-        /// What it was.
+        /// The previous state.
         before: State,
-        /// What it is.
+        /// The new state.
         now: State,
     },
-    /// A cell of an earlier life of the fleet host was lost before this one began.
+    /// A cell of an earlier run of the fleet host was lost before this run began.
     Missing {
         /// The cell.
         cell: String,
-        /// What it is.
+        /// Its state.
         now: State,
     },
-    /// A contact or a change was told, for the first time or with more known of it.
+    /// A contact or a change was reported, for the first time or with more detail.
     Recorded {
         /// The cell.
         cell: String,
-        /// The publisher's life.
+        /// The publisher instance.
         instance: String,
-        /// The record's number in that life.
+        /// The record's number in that instance.
         number: u64,
-        /// When it was told, by the clock of the cell's computer \[ns since the epoch\].
+        /// Send time, by the clock of the cell's computer \[ns since the epoch\].
         told_ns: i64,
         /// The record.
         record: Box<Record>,
@@ -146,22 +147,22 @@ pub enum Effect {
         cell: String,
         /// The stage that misses them.
         stage: String,
-        /// How many more.
+        /// Number of newly lost samples.
         samples: u64,
     },
-    /// Records are missing: ask the cell for those behind this number.
+    /// Records are missing: query the cell for those after this number.
     AskRecords {
         /// The cell.
         cell: String,
-        /// The last number that is known.
+        /// The last known number.
         after: u64,
     },
-    /// Ask the cell what its clock says.
+    /// Query the clock of the cell.
     AskClock {
         /// The cell.
         cell: String,
     },
-    /// A cell lives whose status is not known: ask for it.
+    /// The status of a connected cell is unknown: query it.
     AskStatus {
         /// The cell.
         cell: String,
@@ -169,7 +170,7 @@ pub enum Effect {
 }
 
 impl Effect {
-    /// Whether a fleet host keeps it.
+    /// Returns whether a fleet host stores it.
     pub fn is_kept(&self) -> bool {
         match self {
             Self::Changed { .. }
@@ -188,12 +189,12 @@ pub struct Wall {
     refused: BTreeMap<&'static str, u64>,
     reached: usize,
     now: Now,
-    /// It was looked which cells of an earlier life are missing.
+    /// Whether missing cells of an earlier run have been reported.
     has_looked: bool,
 }
 
 impl Wall {
-    /// A wall on which these cells are expected.
+    /// Creates a wall on which these cells are expected.
     pub fn new(expected: impl IntoIterator<Item = String>) -> Self {
         let mut wall = Self::default();
         for cell in expected.into_iter().take(MAX_CELLS) {
@@ -202,15 +203,15 @@ impl Wall {
         wall
     }
 
-    /// A cell that was seen in an earlier life of the fleet host. `latched`: the life of its publisher that was
-    /// latched, and since when \[ns since the epoch\].
+    /// Adds a cell that was seen in an earlier run of the fleet host. `latched`: its publisher instance that was
+    /// latched, and the start of the latch \[ns since the epoch\].
     pub fn remember(&mut self, known: Remembered, latched: Option<(String, i64)>) {
         if let Some(cell) = self.cell(&known.cell) {
             cell.remember(known, latched);
         }
     }
 
-    /// Takes what was told at `now`.
+    /// Processes an event at `now`.
     pub fn take(&mut self, event: Event, now: Now) -> Vec<Effect> {
         self.now = now;
         let mut effects = Vec::new();
@@ -289,7 +290,7 @@ impl Wall {
         effects
     }
 
-    /// Time goes on: what was fresh may be stale now.
+    /// Advances the time: fresh data may have become stale.
     pub fn tick(&mut self, now: Now) -> Vec<Effect> {
         self.now = now;
         let reached = self.reached;
@@ -303,18 +304,18 @@ impl Wall {
         effects
     }
 
-    /// The state of a cell.
+    /// Returns the state of a cell.
     pub fn state(&self, cell: &str) -> Option<State> {
         let watched = self.cells.get(cell)?;
         Some(watched.state(self.reached, self.now))
     }
 
-    /// The newest status of a cell.
+    /// Returns the newest status of a cell.
     pub fn status_of(&self, cell: &str) -> Option<&StatusMessage> {
         self.cells.get(cell)?.newest()
     }
 
-    /// All that is known, the worst first.
+    /// Returns a snapshot of all cells, the most severe first.
     pub fn snapshot(&self) -> Snapshot {
         let views = self.cells.iter();
         let views = views.map(|(name, watched)| watched.view(name, self.reached, self.now));
@@ -326,7 +327,7 @@ impl Wall {
         )
     }
 
-    /// The cell, new or known; refused where there are too many.
+    /// Returns the cell, new or known; `None` if there are too many.
     fn cell(&mut self, name: &str) -> Option<&mut Watched> {
         if self.cells.len() >= MAX_CELLS && !self.cells.contains_key(name) {
             self.refuse("too many cells");

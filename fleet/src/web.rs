@@ -1,7 +1,7 @@
 //! The page: the wall, a page for each cell, incidents, metrics. Plain HTTP, no framework, nothing from elsewhere.
 //!
-//! Whoever reaches the address can look. Only users whom a token names can act, and what they do goes to the cell as the
-//! command that `tauscope send` sends.
+//! Anyone who reaches the address can read. Only users with a token can act; their actions are sent to the cell as
+//! the commands of `tauscope send`.
 
 mod actions;
 mod events;
@@ -32,30 +32,30 @@ use crate::physics::CellPhysics;
 use crate::store::Note;
 use sessions::Sessions;
 
-/// No form is longer \[bytes\].
+/// Maximum size of a form \[bytes\].
 const MAX_BODY_BYTES: usize = 4096;
-/// Notes that are shown at most.
+/// Maximum number of notes shown.
 const MOST_NOTES: u32 = 50;
-/// Pages that may follow the wall at a time. Resolution: every screen of a plant, and some.
+/// Maximum number of pages that follow the wall at a time. Resolution: every screen of a plant, and some.
 const MAX_FOLLOWERS: usize = 64;
 
-/// Why there is no page.
+/// An error of serving the page.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// The address cannot be listened at.
+    /// An address that cannot be bound.
     #[error("cannot serve the page at {address}: {source}; is the port taken, or below 1024?")]
     Listen {
         /// The address.
         address: SocketAddr,
-        /// What the system says.
+        /// The operating system's error.
         source: std::io::Error,
     },
-    /// No thread, or no runtime.
+    /// A thread or a runtime that cannot be started.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] std::io::Error),
 }
 
-/// What all handlers share.
+/// State shared by all handlers.
 struct Shared {
     hub: Arc<Hub>,
     users: Users,
@@ -66,7 +66,7 @@ struct Shared {
 
 type App = State<Arc<Shared>>;
 
-/// A page that is served until this is dropped.
+/// A server of the page that runs until it is dropped.
 pub struct Server {
     address: SocketAddr,
     stop: Option<oneshot::Sender<()>>,
@@ -74,10 +74,11 @@ pub struct Server {
 }
 
 impl Server {
-    /// Serves the wall of `hub` at `address`, and through proxies as `origins`; without `users` nobody can act.
+    /// Serves the wall of `hub` at `address`, and through proxies as `origins`. Without `users` the page is
+    /// read-only.
     ///
     /// # Errors
-    /// If the address cannot be listened at.
+    /// If the address cannot be bound.
     pub fn start(
         hub: Arc<Hub>,
         address: SocketAddr,
@@ -125,7 +126,7 @@ impl Server {
         })
     }
 
-    /// Where it listens.
+    /// Returns the address at which it listens.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
@@ -138,7 +139,7 @@ impl Drop for Server {
             let _ = stop.send(());
         }
         if let Some(thread) = self.thread.take() {
-            // A thread that panicked has said so.
+            // A panic has already been reported.
             let _ = thread.join();
         }
     }
@@ -172,7 +173,7 @@ fn router(shared: Arc<Shared>) -> Router {
         .with_state(shared)
 }
 
-/// A page of a user, or of nobody.
+/// Renders a page for the user of the request, or for a visitor who is not logged in.
 fn page(
     shared: &Shared,
     headers: &HeaderMap,
@@ -243,7 +244,7 @@ fn no_physics(shared: &Shared, headers: &HeaderMap, cell: &str) -> Response {
     (StatusCode::NOT_FOUND, body).into_response()
 }
 
-/// The page of a cell's week as a file that stands alone.
+/// Returns the page of a cell's week as a self-contained file.
 pub fn week_page(physics: &CellPhysics, notes: &[Note], now_ns: i64) -> String {
     let style = include_str!("web/style.css");
     pages::physics::week(physics, notes, now_ns, Some(style)).into_string()

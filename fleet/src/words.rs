@@ -22,7 +22,7 @@ pub fn age_at(at_ns: i64, now_ns: i64) -> String {
     age(u64::try_from(ms).unwrap_or(0))
 }
 
-/// How a cell's clock stands against this host's: `340 ms ahead ± 2 ms`; empty where it was not measured.
+/// The offset of a cell's clock from this host's: `340 ms ahead ± 2 ms`; empty if it was not measured.
 pub fn clock(view: &CellView) -> String {
     let (Some(ahead_ms), Some(most_ms)) = (view.clock_ahead_ms, view.clock_uncertainty_ms) else {
         return String::new();

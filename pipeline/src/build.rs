@@ -1,5 +1,5 @@
-//! From what the pipeline file says to stages that run: the same for `run`, `replay` and the check,
-//! which builds every twin and detector to see whether it can be.
+//! Builds stages from their settings, in the same way for `run`, `replay` and the check. The check builds every twin
+//! and detector to validate its settings.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -21,24 +21,24 @@ use crate::provenance::sha256;
 use crate::settings::BesidePublisher;
 use crate::trained;
 
-/// Why a stage cannot be built.
+/// Error while building a stage.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
-    /// The twin's model does not fit the cell.
+    /// A twin file that does not fit the cell.
     #[error(transparent)]
     TwinFile(#[from] tauscope_twin::TwinFileError),
-    /// The twin.
+    /// Invalid settings of the twin.
     #[error(transparent)]
     Twin(#[from] tauscope_twin::TwinError),
-    /// The detector.
+    /// Invalid settings of the detector.
     #[error(transparent)]
     Detect(#[from] tauscope_detect::ConfigError),
-    /// The file of a trained detector.
+    /// An invalid or unreadable file of a trained detector.
     #[error(transparent)]
     Trained(#[from] trained::TrainedFileError),
 }
 
-/// What a source of `cell` must know of it.
+/// Properties of `cell` that its source needs.
 pub fn ingest_setup(cell: &Cell) -> tauscope_ingest::Setup {
     tauscope_ingest::Setup {
         cell: cell.facts.name.clone(),
@@ -58,11 +58,11 @@ pub fn ingest_setup(cell: &Cell) -> tauscope_ingest::Setup {
     }
 }
 
-/// A source of `cell` with the commands that its configuration lets in, and those of an archive. To learn can be asked
-/// for where `somebody_learns`.
+/// Adds commands to a source of `cell`: live ones from the endpoints of its configuration, otherwise those of the
+/// archive. Requests to learn are accepted if `somebody_learns`.
 ///
 /// # Errors
-/// If commands cannot be listened to.
+/// If the command endpoints cannot be opened.
 pub fn commanded(
     source: Box<dyn Source<JointState>>,
     config: &tauscope_ingest::Config,
@@ -83,11 +83,11 @@ pub fn commanded(
     }
 }
 
-/// A source of `cell`. One that is started again goes on behind the sample with the stamp
+/// Opens the source of `cell`. A restarted source that reads a file continues after the sample with the stamp
 /// `after_ns`.
 ///
 /// # Errors
-/// If the source cannot be opened; [`IngestError::is_input`] tells whose fault that is.
+/// If the source cannot be opened; [`IngestError::is_input`] separates input errors from failures.
 pub fn ingest(
     config: &tauscope_ingest::Config,
     robot: Option<&SimulatedRobot>,
@@ -95,12 +95,12 @@ pub fn ingest(
     after_ns: Option<i64>,
 ) -> Result<Box<dyn Source<JointState>>, IngestError> {
     let setup = ingest_setup(cell);
-    // What is live does not come a second time.
+    // A live source cannot repeat past samples.
     let (_, source) = config.source()?;
     let Some(after_ns) = after_ns.filter(|_| source.file().is_some()) else {
         return tauscope_ingest::open(config, &setup, robot);
     };
-    // What was given out before is read again as fast as can be, and only then paced.
+    // Samples emitted before the restart are skipped at full speed; pacing starts after them.
     let fast = tauscope_ingest::Config {
         rate: Rate::Fast,
         ..config.clone()
@@ -115,7 +115,7 @@ pub fn ingest(
     })
 }
 
-/// A source without the samples up to a stamp.
+/// A source that skips the samples up to a stamp.
 struct After {
     inner: Box<dyn Source<JointState>>,
     after_ns: i64,
@@ -158,7 +158,7 @@ impl Source<JointState> for After {
     }
 }
 
-/// The correction of `model` for `cell`; without one, friction, rotors and springs of the robot's file.
+/// The correction of `model` for `cell`; without a model, friction, rotor inertias and springs of the robot's file.
 ///
 /// # Errors
 /// If the model does not fit the cell.
@@ -173,7 +173,7 @@ pub fn correction(model: Option<&TwinFile>, cell: &Cell) -> Result<Correction, B
     })
 }
 
-/// A twin of `cell`.
+/// Builds a twin of `cell`.
 ///
 /// # Errors
 /// If the model does not fit the cell, or the twin cannot be built from its configuration.
@@ -189,12 +189,12 @@ pub fn twin(
         tool_link: cell.tool_link(),
     };
     let mut correction = correction(model, cell)?;
-    // Another simulation has the friction of its own file.
+    // An external twin already includes the friction of its own model.
     if model.is_none() && config.expected == Expected::Topic {
         correction.terms.clear();
     }
     if config.effort_cutoff_hz.is_some() {
-        // One for all joints.
+        // The configured cutoff overrides those of the model for all joints.
         for joint in &mut correction.joints {
             joint.effort_cutoff_hz = None;
         }
@@ -205,10 +205,10 @@ pub fn twin(
     Ok(Twin::new(&config, setup, correction)?)
 }
 
-/// A detector behind a twin of `cell` with this `model`, and what it shares with others.
+/// Builds a detector behind a twin of `cell` with this `model`; `shared` is the state it shares with other detectors.
 ///
 /// # Errors
-/// If the model does not fit the cell, a trained file cannot be read, or the configuration is none.
+/// If the model does not fit the cell, a trained file cannot be read, or the configuration is invalid.
 pub fn detect(
     config: &tauscope_detect::Config,
     model: Option<&TwinFile>,
@@ -221,7 +221,7 @@ pub fn detect(
     Ok(config.stage(setup)?)
 }
 
-/// What a detector behind a twin of `cell` with this `model` must know.
+/// Properties of `cell` and of its twin with this `model` that a detector needs.
 ///
 /// # Errors
 /// If the model does not fit the cell.
@@ -232,7 +232,7 @@ pub fn detect_setup(
     let correction = correction(model, cell)?;
     let constants = cell.facts.torque_constants_nm_per_a.as_deref();
     let joints = correction.joints.iter().enumerate().map(|(index, joint)| {
-        // Where friction outweighs the modelled effort, the fitted gain is no scale from torque to current.
+        // If friction exceeds the modelled effort, the fitted gain is not the ratio of current to torque.
         let effort_per_nm = match (cell.facts.effort_unit, constants) {
             (EffortUnit::Nm, _) => 1.0,
             (EffortUnit::A, Some(constants)) => 1.0 / constants[index],
@@ -270,7 +270,8 @@ pub fn detect_setup(
     })
 }
 
-/// A watch over a twin of `cell` with this `model` and low-pass on efforts of joints that have none of their own there.
+/// Builds a watch over a twin of `cell` with this `model`. `effort_cutoff_hz` is the low-pass on the efforts of
+/// joints that have none of their own in the model.
 ///
 /// # Errors
 /// If the model does not fit the cell.
@@ -291,25 +292,25 @@ pub fn watch(
     Ok(Watch::new(config, &setup))
 }
 
-/// What a recorder must know of a stream.
+/// Properties of a stream that a recorder needs.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct StreamFacts {
-    /// The stage that makes it.
+    /// The stage that emits it.
     pub stage: String,
     /// Its cell.
     pub cell: String,
-    /// What it carries.
+    /// Sample type.
     pub kind: SampleKind,
-    /// The detector, where it is one of ours.
+    /// The detector, if it is a built-in one.
     pub detector: Option<String>,
-    /// Whether its detections, if it makes any, tell of contacts.
+    /// Whether its detections, if it emits any, are contacts.
     pub judges_contact: bool,
 }
 
-/// A recorder of `streams`, which belong to `cells`.
+/// Builds a recorder of `streams`, which belong to `cells`.
 ///
 /// # Errors
-/// If cells, streams and file names do not fit together, or a file cannot be made.
+/// If cells, streams and file names are inconsistent, or a file cannot be created.
 pub fn recorder(
     config: &tauscope_record::Config,
     cells: &[&Cell],
@@ -342,7 +343,7 @@ pub fn recorder(
     Recorder::new(config, &infos, &streams, provenance)
 }
 
-/// What the scores in a stream are measured in; empty for none, and where nobody knows.
+/// Unit of the scores in a stream; empty if it has no scores or their unit is unknown.
 fn score_unit(stream: &StreamFacts, effort: EffortUnit) -> &'static str {
     let entry = stream
         .detector
@@ -351,10 +352,10 @@ fn score_unit(stream: &StreamFacts, effort: EffortUnit) -> &'static str {
     entry.map_or("", |entry| entry.score_unit.in_words(effort))
 }
 
-/// A publisher of `streams` of one cell. `restarted`: it is not its first life.
+/// Builds a publisher of `streams` of one cell. `restarted` is set after its first start.
 ///
 /// # Errors
-/// If it cannot reach or be reached by those it is to tell.
+/// If a network endpoint cannot be opened.
 pub fn publisher(
     config: &tauscope_publish::Config,
     commands: Option<&ZenohEndpoints>,

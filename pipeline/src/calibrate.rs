@@ -1,5 +1,5 @@
-//! Calibration: what a twin's gain, offset and noise per joint are, and what the detectors' scores do
-//! while nothing touches the robot. The stages are the pipeline's own, so that the numbers hold there.
+//! Calibration of a twin's gain, offset and noise per joint, and of the detectors' contact-free scores. It uses the
+//! stages of the pipeline, so that the values hold there.
 
 mod cutoff;
 mod measured;
@@ -25,7 +25,7 @@ use crate::replay::ReplayError;
 use crate::report::without_path;
 use read::{Read, Settled};
 
-/// What to calibrate, and on what.
+/// A calibration: the twin and its recordings.
 #[derive(Debug)]
 pub struct Job<'a> {
     /// The cell.
@@ -34,69 +34,69 @@ pub struct Job<'a> {
     pub topics: &'a Topics,
     /// The twin, without a model.
     pub twin: &'a tauscope_twin::Config,
-    /// Contact-free recordings that the gains are fitted on.
+    /// Contact-free recordings for fitting the gains.
     pub fit: &'a [PathBuf],
-    /// Contact-free recordings that noise and scores are measured on; those of the fit if empty.
+    /// Contact-free recordings for measuring noise and scores; if empty, those of the fit.
     pub validation: &'a [PathBuf],
 }
 
-/// Why a calibration gives nothing.
+/// Error that ends a calibration.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrateError {
-    /// A recording cannot be run through the stages.
+    /// A recording that the stages cannot process.
     #[error("{}: {}", recording.display(), without_path(recording, source.to_string()))]
     Recording {
         /// The recording.
         recording: PathBuf,
-        /// Why.
+        /// The cause.
         source: ReplayError,
     },
-    /// No sample of the recordings measures an effort.
+    /// No sample with a measured effort.
     #[error(
         "no sample to calibrate on: none of {samples} joint states measures an effort; record the topic that has efforts, \
          with the drives on"
     )]
     NoEffort {
-        /// Joint states that were read.
+        /// Number of joint states read.
         samples: u64,
     },
-    /// The recordings are over before the filters have settled.
+    /// Recordings that end before the filters have settled.
     #[error(
         "no sample to calibrate on: the twin's filters need {settling_s:.1} s without a gap, and the {samples} joint states \
          with efforts end before; record longer pieces"
     )]
     TooShort {
-        /// Joint states with efforts that were read.
+        /// Number of joint states with efforts read.
         samples: u64,
-        /// Time that the filters need \[s\].
+        /// Settling time of the filters \[s\].
         settling_s: f64,
     },
-    /// All samples are labelled as touched.
+    /// No sample that is contact-free by the labels.
     #[error(
         "no sample to calibrate on: the labels leave no time in which nothing touches the robot"
     )]
     AllTouched,
-    /// Nothing that is learnt from this recording can be right.
+    /// An implausible recording, which would give a wrong calibration.
     #[error("{}: {oddity}", recording.display())]
     Implausible {
         /// The recording.
         recording: PathBuf,
-        /// Why.
+        /// The fault.
         oddity: Finding,
     },
-    /// The arm stands, and how many N m an ampere gives is not known.
+    /// An arm at rest with unknown torque constants.
     #[error(
-        "the arm stands in all recordings, so that no gain from N m to A can be told: record it in motion, or give \
+        "the arm is at rest in all recordings, so the gain from N m to A cannot be determined: record it in motion, or give \
          the torque constants"
     )]
     Stands,
-    /// The recordings are not of this robot in this unit.
+    /// Recordings that are not of this robot, or not in this unit.
     #[error(transparent)]
     WrongScale(#[from] ScaleFault),
 }
 
 impl CalibrateError {
-    /// Whether the arguments or files are wrong (exit code 2), rather than what happened since.
+    /// Whether the error is in the arguments or input files (exit code 2).
     pub fn is_input(&self) -> bool {
         match self {
             Self::Recording { source, .. } => source.is_input(),
@@ -110,24 +110,24 @@ impl CalibrateError {
     }
 }
 
-/// A calibrated twin, and what was lost on the way to it.
+/// A calibrated twin, with the number of lost samples.
 #[derive(Debug)]
 pub struct Calibrated {
     /// The twin.
     pub file: TwinFile,
-    /// Samples that the gains were fitted on.
+    /// Number of samples for the fit of the gains.
     pub samples: u64,
-    /// Samples of the recordings that were lost or refused.
+    /// Number of samples of the recordings that were lost or refused.
     pub lost: u64,
-    /// What is odd in the recordings, a line each.
+    /// Irregularities in the recordings, a line each.
     pub notes: Vec<String>,
-    /// Why the gains cannot be right, though they could be fitted.
+    /// Reason why the fitted gains are implausible.
     doubt: Option<CalibrateError>,
 }
 
 impl Job<'_> {
-    /// Fits gain and offset, then measures noise and scores. `progress` is told the place of the
-    /// recording among all that are read, and how far it is.
+    /// Fits gain and offset, then measures noise and scores. `progress` receives the index of the recording among all
+    /// that are read, and its completed fraction.
     ///
     /// # Errors
     /// If a recording cannot be read, or all are too short.
@@ -149,8 +149,7 @@ impl Job<'_> {
         Ok(calibrated)
     }
 
-    /// Fits gain and offset on the samples of which `is_free`, told the recording and the stamp, says that
-    /// nothing touches the robot.
+    /// Fits gain and offset on the contact-free samples; `is_free` decides by recording and stamp.
     ///
     /// # Errors
     /// If a recording cannot be read, or all are too short.
@@ -201,7 +200,8 @@ impl Job<'_> {
         for (name, fit) in self.cell.facts.joint_names.iter().zip(&fits) {
             let joint = JointCorrection {
                 gain: fit.gain,
-                // A twin in A already contains its torque constants; the fitted gain does not tell them.
+                // An external twin in A already contains its torque constants, so they do not follow from the fitted
+                // gain.
                 gain_deviation: (from_topic && !in_nm)
                     .then_some(fit.gain.abs().max(f64::MIN_POSITIVE)),
                 offset: fit.offset,
@@ -219,7 +219,7 @@ impl Job<'_> {
         })
     }
 
-    /// What noise and scores are measured on.
+    /// Recordings on which noise and scores are measured.
     fn measured(&self) -> &[PathBuf] {
         if self.validation.is_empty() {
             self.fit
@@ -228,15 +228,14 @@ impl Job<'_> {
         }
     }
 
-    /// How many recordings are read, for a progress bar.
+    /// Number of recordings that are read, for a progress bar.
     pub fn recordings(&self) -> usize {
         let measured = self.measured().len();
         let chosen = usize::from(self.twin.effort_cutoff_hz.is_none()) * measured;
         self.fit.len() + chosen + measured
     }
 
-    /// Runs a recording through source and twin and hands over every sample whose filters have
-    /// settled.
+    /// Runs a recording through source and twin and passes every sample with settled filters to `take`.
     fn each(
         &self,
         recording: &Path,
@@ -294,7 +293,7 @@ impl Job<'_> {
         })
     }
 
-    /// The twin as far as it is known before the fit.
+    /// The twin file before the fit.
     pub fn file(&self) -> TwinFile {
         let facts = &self.cell.facts;
         TwinFile {
@@ -323,7 +322,7 @@ impl Job<'_> {
     }
 }
 
-/// Refuses a recording from which nothing right can be learnt.
+/// Rejects an implausible recording.
 fn refuse_fault(recording: &Path, findings: &[Finding]) -> Result<(), CalibrateError> {
     match findings.iter().find(|it| it.effect() == Effect::Fault) {
         Some(fault) => Err(CalibrateError::Implausible {

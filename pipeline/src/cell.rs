@@ -1,4 +1,4 @@
-//! A cell: its robot, and the facts that its stages need.
+//! A cell: its robot, and the properties that its stages need.
 
 mod constants;
 mod joints;
@@ -19,10 +19,10 @@ pub use joints::{Fixed, recorded_joint_names};
 use crate::report::{Problem, Report};
 use crate::urdf;
 
-/// A cell, its names looked up.
+/// A cell with all names resolved.
 #[derive(Debug, Clone)]
 pub struct Cell {
-    /// The facts as they can be handed to another process.
+    /// Properties that can be sent to another process.
     pub facts: CellFacts,
     /// The robot.
     pub model: Option<Model>,
@@ -30,7 +30,7 @@ pub struct Cell {
     pub findings: Vec<String>,
 }
 
-/// What a stage must know of its cell.
+/// Properties of a cell that its stages need.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct CellFacts {
     /// The cell's name.
@@ -41,19 +41,19 @@ pub struct CellFacts {
     pub joint_names: Vec<String>,
     /// Unit of the measured effort.
     pub effort_unit: EffortUnit,
-    /// By joint \[N m/A\], where the effort is a current and they are known.
+    /// Torque constants by joint \[N m/A\], if the effort is a current and they are known.
     pub torque_constants_nm_per_a: Option<Vec<f64>>,
     /// The tool.
     pub tool: Option<ToolEntry>,
-    /// The impedance that a Cartesian controller holds the tool with.
+    /// The impedance of a Cartesian controller at the tool.
     pub impedance: Option<tauscope_detect::Impedance>,
 }
 
 impl Cell {
-    /// The cell from its facts.
+    /// Builds the cell from its properties.
     ///
     /// # Errors
-    /// If the URDF is not one, which the check of the file had excluded.
+    /// If the URDF is invalid, which the check of the file excludes.
     pub fn from_facts(facts: CellFacts) -> Result<Self, tauscope_dynamics::ModelError> {
         let model = facts.urdf.as_deref().map(Model::from_urdf).transpose()?;
         Ok(Self {
@@ -63,11 +63,11 @@ impl Cell {
         })
     }
 
-    /// A cell of the robot at `path`, without a pipeline file; `constants` by joint \[N m/A\], none where they are not
-    /// known. `problem` says where they stand.
+    /// Builds a cell of the robot at `path`, without a pipeline file. `constants` are the torque constants by joint
+    /// \[N m/A\], empty if unknown; `problem` reports an error in them at its place.
     ///
     /// # Errors
-    /// If the URDF cannot be read or used, or the constants are not those of its joints.
+    /// If the URDF cannot be read or used, or the constants do not match its joints.
     pub fn from_urdf(
         path: &Path,
         effort_unit: EffortUnit,
@@ -84,10 +84,10 @@ impl Cell {
         Ok(cell)
     }
 
-    /// A cell of which no more than the joints is known; else as [`Cell::from_urdf`].
+    /// Builds a cell of which only the joints are known; otherwise as [`Cell::from_urdf`].
     ///
     /// # Errors
-    /// If there are too many joints, or the constants are not theirs.
+    /// If there are too many joints, or the constants do not match them.
     pub fn from_joints(
         name: String,
         joint_names: Vec<String>,
@@ -119,13 +119,14 @@ impl Cell {
         })
     }
 
-    /// By joint, the effort limit of the robot file \[N m or N\]; empty without a robot.
+    /// Effort limits of the robot file by joint \[N m or N\]; empty without a robot.
     pub fn effort_limits(&self) -> Vec<Option<f64>> {
         let joints = self.model.iter().flat_map(Model::joints);
         joints.map(|joint| joint.limits.effort).collect()
     }
 
-    /// Friction, rotors and springs that the robot's file states, if the measured unit is N m or torque constants are known.
+    /// Friction, rotor inertias and springs of the robot's file, if the measured unit is N m or torque constants are
+    /// known.
     pub fn stated_terms(&self) -> Vec<TermSpec> {
         let facts = &self.facts;
         let is_told =
@@ -134,20 +135,20 @@ impl Cell {
         model.map_or_else(Vec::new, of_drives)
     }
 
-    /// The link the tool is attached to.
+    /// Index of the link that the tool is attached to.
     pub fn tool_link(&self) -> Option<usize> {
         self.model
             .as_ref()?
             .link_index(&self.facts.tool.as_ref()?.link)
     }
 
-    /// The point of the tool that touches things, in its link's frame \[m\].
+    /// Contact point of the tool in its link's frame \[m\].
     pub fn contact_point_on_tool_m(&self) -> Option<[f64; 3]> {
         self.facts.tool.as_ref()?.contact_point_m
     }
 }
 
-/// What is said of a cell with too many joints.
+/// Error message for a cell with too many joints.
 pub(crate) fn too_many(joints: usize) -> String {
     format!("{joints} joints, at most {MAX_JOINTS} are supported")
 }
@@ -158,7 +159,7 @@ pub(crate) fn too_many(joints: usize) -> String {
 pub struct ToolEntry {
     /// The link it is attached to.
     pub link: String,
-    /// Its mass \[kg\]. 0 where only a topic tells of a tool.
+    /// Its mass \[kg\]; 0 if only a topic reports the tool.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub mass_kg: f64,
@@ -168,7 +169,7 @@ pub struct ToolEntry {
     /// Its inertia about its centre of mass, axes of the link: xx, xy, xz, yy, yz, zz \[kg m²\].
     #[serde(default)]
     pub inertia_kgm2: [f64; 6],
-    /// The point of it that touches things, in the link's frame \[m\]. By default the link's origin.
+    /// Its contact point in the link's frame \[m\]; by default the link's origin.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_point_m: Option<[f64; 3]>,
 }

@@ -1,5 +1,5 @@
-//! The kinds of file that people write, one type each: what `tauscope schema` prints and
-//! `tauscope check --kind` checks.
+//! User-written kinds of file, one type each. `tauscope schema` prints their schemas and `tauscope check --kind`
+//! checks them.
 
 mod case;
 mod keys;
@@ -21,21 +21,21 @@ pub use set::{Impedance, SetFile};
 /// A kind of file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum FileKind {
-    /// What `tauscope run` runs.
+    /// A pipeline, which `tauscope run` runs.
     #[default]
     Pipeline,
     /// A corrected twin, which `tauscope calibrate` writes.
     Twin,
-    /// What `tauscope simulate` simulates.
+    /// A scenario, which `tauscope simulate` simulates.
     Scenario,
-    /// A robot and recordings whose mismatch is to be explained.
+    /// A robot and recordings for `tauscope explain`.
     Case,
-    /// Labelled recordings that detectors are evaluated on.
+    /// Labelled recordings for `tauscope evaluate`.
     Set,
 }
 
 impl FileKind {
-    /// The JSON Schema of its type.
+    /// JSON Schema of the file.
     pub fn schema(self) -> Schema {
         match self {
             Self::Pipeline => schemars::schema_for!(PipelineFile),
@@ -46,12 +46,12 @@ impl FileKind {
         }
     }
 
-    /// The schema as a text for editors.
+    /// Schema as a text for editors.
     pub fn schema_text(self) -> String {
         text_of_schema(&self.schema())
     }
 
-    /// All its keys as Markdown tables below headings of the third level.
+    /// All keys as Markdown tables below headings of the third level.
     pub fn keys_text(self) -> String {
         keys::keys(&self.schema().to_value(), 3)
     }
@@ -59,7 +59,7 @@ impl FileKind {
     /// Checks the shape of the file at `path`.
     ///
     /// # Errors
-    /// Everything that is wrong with it, each with its place.
+    /// All errors, each with its place.
     pub fn check_shape(self, path: &Path) -> Result<(), Report> {
         fn of<T: DeserializeOwned + JsonSchema>(path: &Path) -> Result<(), Report> {
             yaml::load::<T>(path).map(|_| ())
@@ -74,14 +74,14 @@ impl FileKind {
     }
 }
 
-/// A schema as a text for editors and people.
+/// Schema as formatted text.
 pub fn text_of_schema(schema: &Schema) -> String {
     let mut schema = schema.clone().to_value();
     plain_descriptions(&mut schema);
     format!("{schema:#}")
 }
 
-/// Descriptions come from Rust documentation, where brackets are escaped.
+/// Removes the backslashes that escape brackets in Rust documentation, the source of the descriptions.
 fn plain_descriptions(schema: &mut Value) {
     match schema {
         Value::Object(map) => {

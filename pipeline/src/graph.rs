@@ -1,12 +1,12 @@
 //! A pipeline in one process and one thread.
 //!
-//! After each step of a source the stages below take what there is for them, a sample each in the order of the
-//! pipeline (each stage after those it listens to) until nothing is left, then the sinks, before the next step. So
-//! stages that listen to one stream go through it side by side, as those that share what they derive must, and the
-//! order of everything that is written is a function of the pipeline and the recording alone.
+//! Each step of a source is processed completely before the next one. The stages take one sample each, in the order
+//! of the pipeline (each stage after its inputs), until none is left; then the sinks run. Stages that listen to the
+//! same stream therefore advance together, as those that share derived values must. The order of all outputs depends
+//! on the pipeline and the recording only.
 //!
-//! No sample is copied on its way: the stages behind read it where its maker wrote it (`lane.rs`). A transport of the
-//! bus would do the same with a lock and a wake-up a sample, which one thread needs neither of.
+//! No sample is copied: the following stages read it in the buffer of its producer (`lane.rs`). A transport of the
+//! bus would add a lock and a wake-up per sample, which one thread does not need.
 
 mod lane;
 mod sink;
@@ -25,7 +25,7 @@ use self::lane::{Lane, Reader, Tidy};
 pub use self::sink::SinkInput;
 use self::sink::SinkNode;
 
-/// Where a stage's output goes, and the header of what went out last.
+/// Output of a stage, with the header of the last sample.
 struct Outlet<T> {
     lane: Rc<Lane<T>>,
     newest: Option<Header>,
@@ -38,7 +38,7 @@ impl<T: Sample> Emit<T> for Outlet<T> {
     }
 }
 
-/// A stage's health reports, by the stream's own clock.
+/// Health reports of a stage, timed by the stream's clock.
 struct HealthOutlet {
     clock: HealthClock,
     lane: Rc<Lane<Health>>,
@@ -56,16 +56,16 @@ impl HealthOutlet {
     }
 }
 
-/// What a stage has counted.
+/// Sample counters of a stage.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct StageCounts {
     /// The stage.
     pub stage: String,
-    /// Samples that came in; for a source, those that it read.
+    /// Number of samples received; for a source, read.
     pub received: u64,
-    /// Samples that went out.
+    /// Number of samples emitted.
     pub emitted: u64,
-    /// Samples that it had to refuse, or that did not reach it.
+    /// Number of samples that were refused or did not arrive.
     pub dropped: u64,
 }
 
@@ -81,11 +81,12 @@ impl StageCounts {
     }
 }
 
-/// A stage with its links, whatever its types are.
+/// A stage with its links, independent of its sample types.
 trait Node {
-    /// A source's step, a stage's next sample, or all there is for a sink; false if there was nothing.
+    /// Performs a source's step, or processes a stage's next sample or all samples of a sink; false if there was
+    /// none.
     fn turn(&mut self) -> Result<bool, StageError>;
-    /// Nothing more will come out of it.
+    /// Whether it will emit nothing more.
     fn is_over(&self) -> bool;
     fn counts(&self) -> StageCounts;
     fn fraction_done(&self) -> Option<f64> {
@@ -227,7 +228,7 @@ pub struct Graph<'a> {
     nodes: Vec<(Place, Box<dyn Node + 'a>)>,
 }
 
-/// Where a node stands.
+/// Position of a node in the graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Place {
     Source,
@@ -236,12 +237,12 @@ enum Place {
 }
 
 impl<'a> Graph<'a> {
-    /// How many sources, stages and sinks there are.
+    /// Number of sources, stages and sinks.
     pub fn len(&self) -> usize {
         self.nodes.len()
     }
 
-    /// Whether there is none.
+    /// Whether the graph has no nodes.
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }
@@ -286,7 +287,7 @@ impl<'a> Graph<'a> {
         Ok(stream)
     }
 
-    /// A receiving end of `stream` for a sink.
+    /// Returns an input of a sink for `stream`.
     ///
     /// # Errors
     /// If the stream carries another type.
@@ -294,7 +295,7 @@ impl<'a> Graph<'a> {
         Ok(SinkInput::new::<T>(&stream.stage, stream.reader()?))
     }
 
-    /// A receiving end of the health reports of the stage that makes `stream`, for a sink.
+    /// Returns an input of a sink for the health reports of the stage that emits `stream`.
     pub fn listen_to_health(&self, stream: &Stream) -> SinkInput {
         SinkInput::new(&stream.stage, stream.health.reader())
     }
@@ -324,12 +325,12 @@ impl<'a> Graph<'a> {
         (stream, outlet, health)
     }
 
-    /// Runs until every source has ended and everything has passed through. `progress` is told how
-    /// far the sources are, from 0 to 1, where they know, and by returning `false` ends the work: nothing is
-    /// completed, and `None` comes back.
+    /// Runs until every source has ended and all samples are processed. `progress` receives the completed fraction of
+    /// the sources of known length, 0 to 1. If it returns `false`, the run is cancelled, no output is completed, and
+    /// the result is `None`.
     ///
     /// # Errors
-    /// The first that a stage gives.
+    /// The first error of a stage.
     pub fn run(
         &mut self,
         progress: &mut dyn FnMut(f64) -> bool,
@@ -351,7 +352,7 @@ impl<'a> Graph<'a> {
         }
     }
 
-    /// A turn for each node that stands there; false if there was nothing for any.
+    /// Runs each node at this position once; false if none had anything to process.
     fn turn(&mut self, at: Place) -> Result<bool, StageError> {
         let mut any = false;
         for (_, node) in self.nodes.iter_mut().filter(|(place, _)| *place == at) {

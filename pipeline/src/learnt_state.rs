@@ -1,4 +1,4 @@
-//! What a detector has learnt: read from the file that its settings name, and kept from one run to the next.
+//! Learnt state of a detector: read from the file that its settings name, and kept from one run to the next.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,16 +14,14 @@ use crate::suggest;
 use crate::yaml::{self, Place};
 use tauscope_archive::whole_file::{self, Existing};
 
-/// Time between two writes, in time of the stream \[ns\]. What was learnt since is lost if the process
-/// dies.
-/// Resolution: writes to disk, against what a killed process forgets.
+/// Interval between writes, in stream time \[ns\]. The state learnt since the last write is lost in a crash.
+/// Resolution: disk writes, against the loss after a crash.
 const WRITE_EVERY_NS: i64 = 10_000_000_000;
 
-/// Lets the detector go on from what the file that `config` names holds, if there is one yet. Gives the
-/// file's path.
+/// Resumes the state from the file that `config` names, if it exists. Returns the path of the file.
 ///
 /// # Errors
-/// Everything that is wrong with the file.
+/// All errors in the file.
 pub fn resume(config: &mut Config) -> Result<Option<PathBuf>, Report> {
     let path = config.state_mut().cloned();
     if let Some(path) = path.as_ref().filter(|path| path.exists()) {
@@ -34,27 +32,28 @@ pub fn resume(config: &mut Config) -> Result<Option<PathBuf>, Report> {
     Ok(path)
 }
 
-/// What a watch has learnt, out of the file at `path`, if it is there yet.
+/// Reads the learnt state of a watch from the file at `path`, if it exists.
 ///
 /// # Errors
-/// Everything that is wrong with the file.
+/// All errors in the file.
 pub fn of_watch(path: &Path, joints: usize) -> Result<Option<Memory>, Report> {
     if !path.exists() {
         return Ok(None);
     }
     let memory = yaml::load::<Memory>(path)?;
     if !memory.value.fits(joints) {
-        let problem = "this is not what a watch has learnt of a robot with as many joints";
+        let problem =
+            "this is not the learnt state of a watch for a robot with this number of joints";
         return Err(memory.at(&Place::root(), problem).into());
     }
     Ok(Some(memory.value))
 }
 
-/// Replaces the file of what was learnt that `config` names, if it names one, by its content. Such a file is
-/// `learnt.yaml` as `init` and `evaluate` write it: by detector, its part of a pipeline file.
+/// Replaces the path of a file of learnt state in `config`, if there is one, by the content of the file. Such a file
+/// is `learnt.yaml` as `init` and `evaluate` write it: for each detector its part of a pipeline file.
 ///
 /// # Errors
-/// Everything that is wrong with the file.
+/// All errors in the file.
 pub fn read_learnt(config: &mut Config, resolve: &dyn Fn(&Path) -> PathBuf) -> Result<(), Report> {
     let named = config.learnt_files().next();
     let Some((name, path)) = named.map(|(name, path)| (name, resolve(path))) else {
@@ -66,9 +65,9 @@ pub fn read_learnt(config: &mut Config, resolve: &dyn Fn(&Path) -> PathBuf) -> R
     let Some(learnt) = learnt else {
         let learned = file.value.iter();
         let learned = learned.filter(|(name, config)| config.learnt(name).is_some());
-        let problem = file.at(&place, format!("nothing that {name} has learnt"));
+        let problem = file.at(&place, format!("no learnt state of {name}"));
         let help = format!(
-            "in this file have learnt: {}",
+            "this file holds the learnt state of: {}",
             suggest::list(learned.map(|(name, _)| name.as_str()))
         );
         return Err(problem.help(help).into());
@@ -77,12 +76,12 @@ pub fn read_learnt(config: &mut Config, resolve: &dyn Fn(&Path) -> PathBuf) -> R
     (config.resume(&learnt)).map_err(|error| file.at(&place, error.to_string()).into())
 }
 
-/// A stage that learns while it runs.
+/// A stage that learns during operation.
 pub trait Learns: Stage<TwinState, Detection> {
-    /// What it has learnt, to be given to its next life; `None` if there is nothing.
+    /// Learnt state, for the next start of the stage; `None` if there is none.
     fn learnt(&self) -> Option<State>;
 
-    /// Whether it learns just now, so that what it has learnt is not whole yet.
+    /// Whether it is learning now, so that its state is incomplete.
     fn is_learning(&self) -> bool;
 }
 
@@ -106,15 +105,15 @@ impl Learns for Watch {
     }
 }
 
-/// A stage whose learnt state is written to a file: as its learning ends, at short intervals, and at the end. While it
-/// learns nothing is written, so a stage that dies then begins to learn anew. Its stream is untouched.
+/// A stage whose learnt state is written to a file: when learning ends, at regular intervals, and at the end. Nothing
+/// is written during learning, so a stage that crashes then starts to learn again. Its stream is unchanged.
 pub struct Kept<S> {
     stage: S,
     keeper: Option<Keeper>,
 }
 
 impl<S: Learns> Kept<S> {
-    /// `stage`, whose state is kept at `path`, if anywhere.
+    /// Wraps `stage`, whose state is kept at `path`, if given.
     pub fn new(stage: S, path: Option<PathBuf>) -> Self {
         let was_learning = stage.is_learning();
         Self {
@@ -157,7 +156,7 @@ impl<S: Learns> Stage<TwinState, Detection> for Kept<S> {
     }
 }
 
-/// Writes a file again and again, in a thread of its own: no sample waits for a disk.
+/// Writes the file in a separate thread, so that no sample waits for the disk.
 struct Keeper {
     path: PathBuf,
     written_ns: Option<i64>,
@@ -191,7 +190,7 @@ impl Keeper {
         }
     }
 
-    /// Whether what is learnt by the sample of that stamp is to be written.
+    /// Whether the state at the sample with this stamp must be written.
     fn is_due(&mut self, stamp_ns: i64, is_learning: bool) -> bool {
         let ended = std::mem::replace(&mut self.was_learning, is_learning) && !is_learning;
         let written_ns = *self.written_ns.get_or_insert(stamp_ns);
@@ -202,14 +201,14 @@ impl Keeper {
         due && !is_learning
     }
 
-    /// Has it written, unless the disk is still busy with what was learnt before; then the next one is.
+    /// Queues the state for writing. If the previous write is still in progress, the next state is due at once.
     fn write(&mut self, learnt: State) {
         if self.to_write.try_send(learnt).is_err() {
             self.written_ns = self.written_ns.map(|ns| ns - WRITE_EVERY_NS);
         }
     }
 
-    /// What went wrong with a write.
+    /// Returns the error of a failed write.
     fn check(&self) -> Result<(), StageError> {
         match self.failures.try_recv() {
             Ok(error) => Err(failed(&self.path, &error)),
@@ -217,7 +216,7 @@ impl Keeper {
         }
     }
 
-    /// Waits for the writes, and writes what was `learnt` at the end.
+    /// Waits for pending writes, then writes the final state.
     fn end(self, learnt: Option<State>) -> Result<(), StageError> {
         let Self {
             path,
@@ -226,7 +225,7 @@ impl Keeper {
             ..
         } = self;
         drop(to_write);
-        // It has no reason to panic, and what counts is what is written next.
+        // A panic of the writer does not matter, because the final state is written next.
         let _ = writer.join();
         let Some(learnt) = learnt else {
             return Ok(());
@@ -247,7 +246,7 @@ fn write(path: &Path, learnt: &State) -> Result<(), String> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+    #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
     use tauscope_bus::{Header, LinkError, flags};
     use tauscope_detect::indri::virtual_collision_sensor::{FirstBias, Learn, Settings};
@@ -310,7 +309,7 @@ mod tests {
         }
     }
 
-    /// Waits for the thread that writes.
+    /// Waits until the writer thread has created the file.
     fn appears(path: &Path) -> bool {
         (0..200).any(|_| {
             std::thread::sleep(std::time::Duration::from_millis(10));
@@ -328,7 +327,7 @@ mod tests {
             learning_s: 15.0,
             ..Settings::default()
         };
-        // Nothing ends in order here, as in a process that is killed.
+        // No orderly end, as in a killed process.
         let mut killed = kept_by(&path, settings);
         run(&mut killed, 0..7000);
         assert!(!path.exists(), "it learns; ten seconds have passed");

@@ -1,7 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![cfg_attr(
     test,
-    allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")
+    allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")
 )]
 
 pub mod build;

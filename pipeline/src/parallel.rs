@@ -1,9 +1,9 @@
-//! Work on several items at once.
+//! Parallel map over items.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What `work` makes of each item, in their order, at most `jobs` at once.
+/// Applies `work` to each item with at most `jobs` threads; the results are in the order of the items.
 pub fn map<T: Send, R: Send>(jobs: usize, items: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let waiting: Vec<Mutex<Option<T>>> = items.into_iter().map(|i| Mutex::new(Some(i))).collect();
@@ -39,7 +39,7 @@ pub fn map<T: Send, R: Send>(jobs: usize, items: Vec<T>, work: impl Fn(T) -> R +
         .collect()
 }
 
-/// Whether a core is left beside so many jobs.
+/// Whether the machine has more cores than `jobs`.
 pub fn has_spare_core(jobs: usize) -> bool {
     std::thread::available_parallelism().is_ok_and(|cores| cores.get() > jobs)
 }

@@ -1,4 +1,4 @@
-//! The pipeline file: read, checked, and everything it names looked up.
+//! The pipeline: its file, checked and with all names resolved.
 
 mod cells;
 mod entries;
@@ -24,59 +24,59 @@ use crate::settings::Settings;
 use crate::suggest;
 use crate::yaml;
 
-/// How often a recorder or a publisher looks whether samples are there \[ms\].
-/// Resolution: how late the picture may be, against how often the machine wakes up.
+/// Poll interval of recorders and publishers for new samples \[ms\].
+/// Resolution: latency of the live picture, against wake-ups of the machine.
 const LOOKS_MS: u64 = 10;
-/// How many times a publisher looks at least before it takes a silence for a stop.
-/// Resolution: a look that comes late makes no stop, against how often the machine wakes up.
+/// Smallest number of polls of a publisher within its stop timeout.
+/// Resolution: a single late poll must not cause a stop, against wake-ups of the machine.
 const LOOKS_WITHIN_STOP: u64 = 8;
 
-/// A pipeline in which nothing is wrong as far as one can tell before it starts.
+/// A pipeline that passed all checks before its start.
 #[derive(Debug)]
 pub struct Pipeline {
-    /// The file it was read from.
+    /// Path of the file.
     pub path: PathBuf,
-    /// The file's text, for provenance.
+    /// Text of the file, for provenance.
     pub text: String,
     /// The cells by name.
     pub cells: BTreeMap<String, Cell>,
-    /// The hosts by name; empty where everything runs on one.
+    /// The hosts by name; empty if everything runs on one host.
     pub hosts: BTreeMap<String, HostEntry>,
-    /// The stages, each after those it listens to.
+    /// The stages, each after its inputs.
     pub stages: Vec<Stage>,
     /// SHA-256 of the file that each twin's `model` names, by stage.
     pub model_sha256: BTreeMap<String, String>,
 }
 
-/// A stage, its inputs looked up.
+/// A stage with its inputs resolved.
 #[derive(Debug, Clone)]
 pub struct Stage {
     /// Its name.
     pub name: String,
-    /// What it is.
+    /// Kind of the stage.
     pub role: Role,
-    /// Where it runs, where the file names hosts.
+    /// The host it runs on, if the file names hosts.
     pub host: Option<String>,
     /// The process it runs in, on that host.
     pub process: String,
-    /// Its cell; several for a stage that listens to several.
+    /// Its cell; several for a stage that listens to several cells.
     pub cells: BTreeSet<String>,
-    /// What it listens to, by place in [`Pipeline::stages`].
+    /// Indices of its inputs in [`Pipeline::stages`].
     pub inputs: Vec<usize>,
-    /// What becomes of samples that it has no time for.
+    /// Overflow policy of its inputs.
     pub keep: Keep,
-    /// How it learns that a sample is there.
+    /// Wake-up on a new sample.
     pub wake: Wake,
-    /// When it is started again.
+    /// Restart policy.
     pub restart: Restart,
-    /// Its own part of the file, paths resolved, files read.
+    /// Its settings, with paths resolved and files read.
     pub settings: Settings,
-    /// What a simulated source simulates.
+    /// Scenario of a simulated source.
     pub scenario: Option<ScenarioFacts>,
 }
 
 impl Stage {
-    /// The stream it puts out: `<cell>/<stage>`. A stage that puts one out has one cell.
+    /// Name of its output stream: `<cell>/<stage>`. A stage with an output has one cell.
     pub fn stream(&self) -> String {
         let cell = self.cells.first().map_or("", String::as_str);
         format!("{cell}/{}", self.name)
@@ -84,20 +84,20 @@ impl Stage {
 }
 
 impl Pipeline {
-    /// Reads and checks the file at `path`. Recordings and programs are looked for where their stage
-    /// runs: on `host` if one is given, else here for all.
+    /// Reads and checks the file at `path`. Recordings and programs must exist on the host of their stage: they are
+    /// checked for the stages of `host`, or for all stages if no host is given.
     ///
     /// # Errors
-    /// Everything that is wrong, each with its place.
+    /// All problems, each with its place.
     pub fn load(path: &Path, host: Option<&str>) -> Result<Self, Report> {
         Self::examine(path, Purpose::Run { host })
     }
 
-    /// As [`load`](Self::load), to work on recordings: what only a run reads and writes (the source's own recording,
-    /// the recorders' folders, programs) need not be there.
+    /// Loads the file as [`load`](Self::load) does, for work on recordings. Files that only a run needs (the source's
+    /// own recording, the recorders' folders, programs) may be missing.
     ///
     /// # Errors
-    /// Everything that is wrong, each with its place.
+    /// All problems, each with its place.
     pub fn load_to_replay(path: &Path) -> Result<Self, Report> {
         Self::examine(path, Purpose::Replay)
     }
@@ -138,7 +138,7 @@ impl Pipeline {
                     .collect(),
                 keep: match entry.keep {
                     Some(KeepEntry::Newest) => Keep::Newest,
-                    // Nobody waits for those who are told.
+                    // A publisher must not delay the stages before it.
                     None if wiring.roles[index] == Role::Publish => Keep::Newest,
                     Some(KeepEntry::All) | None => Keep::All,
                 },
@@ -165,12 +165,13 @@ impl Pipeline {
     }
 }
 
-/// How a stage learns that a sample is there, where the file does not say.
+/// Default wake-up of a stage.
 fn wake(settings: &Settings) -> Wake {
     match settings {
-        // Nobody waits for a recorder.
+        // The latency of a recorder does not matter.
         Settings::Record(_) => Wake::EveryMs(LOOKS_MS),
-        // And for a publisher only where there is an alarm; but it must not take a pause of its own for a silence.
+        // The latency of a publisher matters for alarms only. Its polls must be frequent enough that a late one is
+        // not mistaken for silence of the detectors.
         Settings::Publish { config, .. } => {
             let often = (config.stop_after_s * 1e3) as u64 / LOOKS_WITHIN_STOP;
             Wake::EveryMsOrUrgent(often.clamp(1, LOOKS_MS))
@@ -179,12 +180,12 @@ fn wake(settings: &Settings) -> Wake {
     }
 }
 
-/// What a pipeline is read for.
+/// Purpose for which a pipeline is loaded.
 #[derive(Debug, Clone, Copy)]
 enum Purpose<'a> {
-    /// To run it on this host; on all if none is named.
+    /// Run on this host; on all hosts if `None`.
     Run { host: Option<&'a str> },
-    /// To work on recordings, in place of its sources.
+    /// Replay of recordings in place of its sources.
     Replay,
 }
 

@@ -1,4 +1,4 @@
-//! Findings while a pipeline runs: of the joint states of its sources, and of the samples of its twins.
+//! Plausibility findings of a running pipeline, on the joint states of its sources and the samples of its twins.
 
 mod twin;
 mod watched;
@@ -10,11 +10,11 @@ use crate::cell::Cell;
 pub use twin::{PlausibleTwin, cutoff_above_half, cutoffs_above_half, recorded_rate_hz};
 pub use watched::{Watched, WatchedTwin};
 
-/// A pause that is a finding \[ns\].
-/// Physical: an arm may have come and gone in half a second.
+/// Shortest pause that is reported \[ns\].
+/// Physical: a contact may begin and end within half a second.
 const PAUSE_NS: i64 = 500_000_000;
 
-/// Findings about the joint states of `cell`; nothing seen yet.
+/// Creates a plausibility check of the joint states of `cell`.
 pub fn of_cell(cell: &Cell) -> Plausible {
     Plausible::new(&cell.facts.joint_names, cell.model.as_ref())
 }

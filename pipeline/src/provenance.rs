@@ -7,8 +7,8 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-/// SHA-256 of a file, of all files of a bag's folder in the order of their names, or of the files of an episode of a
-/// LeRobot data set and its number, in hexadecimal.
+/// SHA-256 of a recording in hexadecimal. For a bag's folder it covers all files in the order of their names. For an
+/// episode of a LeRobot data set it covers the number and the files of the episode.
 ///
 /// # Errors
 /// If the file cannot be read.

@@ -1,4 +1,4 @@
-//! Which recordings the paths mean that people give.
+//! Expansion of user-given paths to recordings.
 
 use std::path::PathBuf;
 
@@ -6,10 +6,10 @@ use tauscope_archive::recordings_at;
 
 use crate::report::{Problem, Report};
 
-/// Every path, and in the place of a LeRobot data set its episodes.
+/// Returns the paths, with each LeRobot data set replaced by its episodes.
 ///
 /// # Errors
-/// If a data set does not tell its episodes.
+/// If the episodes of a data set cannot be read.
 pub fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Report> {
     let mut all = Vec::with_capacity(paths.len());
     let mut report = Report::default();

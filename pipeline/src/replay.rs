@@ -1,5 +1,5 @@
-//! Replay: the stages of a pipeline over a recording, in process, as fast as the machine allows, the
-//! same bytes every time.
+//! Replay of a recording through the stages of a pipeline, in one process and at full speed. The output is
+//! reproducible byte for byte.
 
 mod error;
 mod observe;
@@ -26,20 +26,20 @@ use redirect::redirect;
 pub use error::ReplayError;
 pub use observe::Observer;
 
-/// What to do with an archive that already holds a twin's effort.
+/// Handling of an archive that already holds a twin's effort.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum TwinChoice {
-    /// Compute it anew.
+    /// Recompute it.
     #[default]
     Recompute,
-    /// Take `/twin/joint_states` and `/residual` as they are in the archive.
+    /// Use `/twin/joint_states` and `/residual` of the archive.
     Keep,
 }
 
-/// What a replay of one recording gave.
+/// Result of the replay of one recording.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// The recording's name without its ending.
+    /// The recording's name without the extension.
     pub recording: String,
     /// The cell.
     pub cell: String,
@@ -47,42 +47,41 @@ pub struct Outcome {
     pub effort_unit: String,
     /// The joints, in URDF order.
     pub joint_names: Vec<String>,
-    /// From the first to the last sample \[s\].
+    /// Time from the first to the last sample \[s\].
     pub duration_s: f64,
     /// Stamps of the first and the last sample \[ns since the epoch\].
     pub stamps_ns: (i64, i64),
-    /// Samples that were lost or refused, over all stages.
+    /// Number of samples that were lost or refused, over all stages.
     pub lost: u64,
-    /// By twin stage.
+    /// Residual sums by twin stage.
     pub twins: Vec<TwinTally>,
-    /// By detect stage.
+    /// Events by detect stage.
     pub detectors: Vec<DetectionTally>,
-    /// By stage, in the order of the pipeline.
+    /// Sample counters by stage, in the order of the pipeline.
     pub stages: Vec<StageCounts>,
-    /// What was written.
+    /// Files written.
     pub files: Vec<PathBuf>,
-    /// What cannot be in the recording, or is odd, a line each.
+    /// Implausibilities and irregularities of the recording, a line each.
     pub notes: Vec<String>,
 }
 
-/// A pipeline prepared to be replayed: its sources replaced by recordings.
+/// A pipeline prepared for replay: recordings replace its source.
 #[derive(Debug)]
 pub struct Replay<'a> {
     pipeline: &'a Pipeline,
-    /// The source whose place the recordings take.
+    /// The source that the recordings replace.
     source: &'a Stage,
-    /// That source and everything that follows from it alone, by place in the pipeline.
+    /// Indices of the source and of its downstream stages in the pipeline.
     members: Vec<usize>,
     twin: TwinChoice,
     reads_ahead: bool,
 }
 
 impl<'a> Replay<'a> {
-    /// Prepares `pipeline`; `source` names the stage whose place the recordings take, where there are
-    /// several.
+    /// Prepares `pipeline`; `source` names the stage that the recordings replace, if there are several.
     ///
     /// # Errors
-    /// If it is not clear which stage that is.
+    /// If that stage is missing or ambiguous.
     pub fn new(
         pipeline: &'a Pipeline,
         source: Option<&str>,
@@ -118,16 +117,15 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// Whether recordings are read by a thread of their own while the stages work, which takes a second core. The
-    /// result is the same.
+    /// Sets whether recordings are read in a separate thread, which uses a second core. The result is the same.
     #[must_use]
     pub fn reading_ahead(mut self, ahead: bool) -> Self {
         self.reads_ahead = ahead;
         self
     }
 
-    /// Stages that a replay leaves out although they hang on its source, because they are programs of
-    /// their own; what listens to them alone is left out, too.
+    /// External programs, which a replay leaves out although they depend on its source. Stages that listen only to
+    /// them are left out, too.
     pub fn left_out(&self) -> Vec<&'a str> {
         let outside = |stage: &&Stage| matches!(stage.settings, Settings::Outside(_));
         self.pipeline
@@ -138,11 +136,11 @@ impl<'a> Replay<'a> {
             .collect()
     }
 
-    /// Replays one recording into `out`, if there is one; `progress` is told how far it is, 0 to 1, and by
-    /// returning `false` ends the work ([`ReplayError::Interrupted`]).
+    /// Replays one recording into `out`, if given. `progress` receives the completed fraction, 0 to 1; if it returns
+    /// `false`, the replay is cancelled ([`ReplayError::Interrupted`]).
     ///
     /// # Errors
-    /// If it cannot be read or not be written; what was begun is left with `.part` at its end.
+    /// If the recording cannot be read or the output cannot be written; unfinished files keep the suffix `.part`.
     pub fn run(
         &self,
         recording: &Path,
@@ -152,10 +150,11 @@ impl<'a> Replay<'a> {
         self.run_with(recording, out, None, progress)
     }
 
-    /// As [`run`](Self::run), into no folder: `beside`, if there is one, is given the samples of every stage.
+    /// Replays one recording as [`run`](Self::run) does, without output files. The additional sink, if given,
+    /// receives the samples of every stage.
     ///
     /// # Errors
-    /// If the recording cannot be read, or `beside` fails.
+    /// If the recording cannot be read, or the additional sink fails.
     pub fn run_beside(
         &self,
         recording: &Path,
@@ -179,7 +178,7 @@ impl<'a> Replay<'a> {
         let mut findings = Findings::default();
         let mut graph = Graph::default();
         let mut streams: BTreeMap<usize, Stream> = BTreeMap::new();
-        // Detectors behind one twin are given the same samples, one after the other.
+        // Detectors behind one twin process the same samples, so they can share derived values.
         let mut shared: BTreeMap<usize, tauscope_detect::Shared> = BTreeMap::new();
         for &index in &self.members {
             let stage = &self.pipeline.stages[index];
@@ -258,7 +257,7 @@ impl<'a> Replay<'a> {
         twins.collect()
     }
 
-    /// The files that a replay of `recording` into `out` writes.
+    /// Returns the files that a replay of `recording` into `out` writes.
     pub fn files(&self, recording: &Path, out: &Path) -> Vec<PathBuf> {
         let mut files = Vec::new();
         for &index in &self.members {
@@ -291,7 +290,7 @@ impl<'a> Replay<'a> {
         Ok(ArchivedTwin::open(recording, &topics, config, &setup)?)
     }
 
-    /// The twin, computed anew or as it is in the recording.
+    /// Adds the twin, recomputed or as in the recording.
     fn add_twin(
         &self,
         graph: &mut Graph<'_>,
@@ -331,7 +330,7 @@ impl<'a> Replay<'a> {
         Ok(())
     }
 
-    /// Receiving ends of these stages' streams.
+    /// Inputs for the streams of these stages.
     fn inputs(
         &self,
         graph: &Graph<'_>,
@@ -357,8 +356,8 @@ pub fn stem(recording: &Path) -> String {
     tauscope_archive::name_of(recording)
 }
 
-/// `source` and every stage that hangs on it without a program that is not ours in between, in the
-/// order of the pipeline.
+/// Returns `source` and every downstream stage that does not depend on an external program, in the order of the
+/// pipeline.
 fn members(pipeline: &Pipeline, source: &Stage) -> Vec<usize> {
     let mut members: Vec<usize> = Vec::new();
     for (index, stage) in pipeline.stages.iter().enumerate() {

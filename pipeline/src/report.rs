@@ -1,4 +1,4 @@
-//! What is wrong with files, all at once, each with its place: printed as rustc prints errors.
+//! Error reports about files: all problems together, each with its place, in the format of rustc.
 
 use std::fmt;
 use std::ops::Range;
@@ -8,7 +8,7 @@ use std::sync::Arc;
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use serde::Serialize;
 
-/// A text that was read, and where from.
+/// The text of a file, with its path.
 #[derive(Debug)]
 pub struct Source {
     /// The path as the user would write it.
@@ -18,7 +18,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// `text` as read from `path`.
+    /// Creates a source from the `text` of `path`.
     pub fn new(path: &Path, text: String) -> Arc<Self> {
         Arc::new(Self {
             path: path.display().to_string(),
@@ -27,27 +27,27 @@ impl Source {
     }
 }
 
-/// A place in a [`Source`], and what is to be said there.
+/// A place in a [`Source`] with a message.
 #[derive(Debug, Clone)]
 struct Label {
     span: Range<usize>,
     text: String,
 }
 
-/// One thing that is wrong.
+/// A problem in a file or in the arguments.
 #[derive(Debug, Clone)]
 pub struct Problem {
     title: String,
     source: Option<Arc<Source>>,
-    /// The first is where it is wrong, the others are what it clashes with.
+    /// The first label marks the problem, the others mark conflicting places.
     labels: Vec<Label>,
-    /// A file without a text: one that could not be read.
+    /// Path of a file without text, such as an unreadable one.
     path: Option<String>,
     help: Option<String>,
 }
 
 impl Problem {
-    /// Something wrong that has no place in a file.
+    /// Creates a problem without a place in a file.
     pub fn new(title: impl Into<String>) -> Self {
         Self {
             title: title.into(),
@@ -58,7 +58,7 @@ impl Problem {
         }
     }
 
-    /// Something wrong with a file as a whole. Where the title begins with the path, that is told once.
+    /// Creates a problem with a whole file. A path at the beginning of the title is removed.
     pub fn of_file(path: &Path, title: impl Into<String>) -> Self {
         Self {
             path: Some(path.display().to_string()),
@@ -66,7 +66,7 @@ impl Problem {
         }
     }
 
-    /// Something wrong at a range of bytes of a text.
+    /// Creates a problem at a byte range of a text.
     pub fn at(source: &Arc<Source>, span: Range<usize>, title: impl Into<String>) -> Self {
         Self {
             source: Some(Arc::clone(source)),
@@ -78,7 +78,7 @@ impl Problem {
         }
     }
 
-    /// Says `text` at the place itself.
+    /// Adds `text` at the place of the problem.
     #[must_use]
     pub fn label(mut self, text: impl Into<String>) -> Self {
         if let Some(label) = self.labels.first_mut() {
@@ -87,7 +87,7 @@ impl Problem {
         self
     }
 
-    /// Points at a second place of the same text.
+    /// Adds a label at another place of the same text.
     #[must_use]
     pub fn also(mut self, span: Range<usize>, text: impl Into<String>) -> Self {
         self.labels.push(Label {
@@ -97,14 +97,14 @@ impl Problem {
         self
     }
 
-    /// Says what would mend it.
+    /// Adds a remedy.
     #[must_use]
     pub fn help(mut self, text: impl Into<String>) -> Self {
         self.help = Some(text.into());
         self
     }
 
-    /// As [`Problem::help`], if there is something to say.
+    /// Adds a remedy as [`Problem::help`] does, if given.
     #[must_use]
     pub fn maybe_help(mut self, text: Option<String>) -> Self {
         self.help = text.or(self.help);
@@ -120,7 +120,7 @@ impl Problem {
         )
     }
 
-    /// For machines.
+    /// The problem in JSON form.
     fn entry(&self) -> Entry<'_> {
         let place = self.source.as_ref().zip(self.labels.first());
         let (line, column) = place
@@ -165,31 +165,31 @@ impl Problem {
     }
 }
 
-/// What is said of a file, without its path in front.
+/// Removes the path of the file from the beginning of a message.
 pub fn without_path(path: &Path, text: impl Into<String>) -> String {
     let text = text.into();
     let rest = text.strip_prefix(&format!("{}: ", path.display()));
     rest.map_or_else(|| text.clone(), str::to_owned)
 }
 
-/// A problem as a program reads it.
+/// A problem in JSON form.
 #[derive(Debug, Serialize)]
 struct Entry<'a> {
-    /// `None` where it is in no file, but in the arguments.
+    /// Path; `None` for a problem in the arguments.
     file: Option<&'a str>,
-    /// From 1; `None` where it concerns the file as a whole.
+    /// Line from 1; `None` for a problem with the whole file.
     line: Option<usize>,
-    /// In characters, from 1.
+    /// Column in characters, from 1.
     column: Option<usize>,
     message: &'a str,
-    /// What is said at the place itself.
+    /// Message at the place of the problem.
     #[serde(skip_serializing_if = "Option::is_none")]
     label: Option<&'a str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     help: Option<&'a str>,
 }
 
-/// Where a byte of a text stands, from 1.
+/// Line and column of a byte of a text, from 1.
 fn line_and_column(text: &str, byte: usize) -> (usize, usize) {
     let before = text.get(..byte).unwrap_or(text);
     let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
@@ -197,11 +197,11 @@ fn line_and_column(text: &str, byte: usize) -> (usize, usize) {
     (line, before[line_start..].chars().count() + 1)
 }
 
-/// Problems that are shown to people; the rest is counted.
-/// Resolution: more than anybody reads at once.
+/// Largest number of problems printed; further ones are counted.
+/// Resolution: more than a user reads at once.
 const MOST_SHOWN: usize = 20;
 
-/// Everything that is wrong. Never empty where it is returned as an error.
+/// All problems found. Never empty if returned as an error.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
     problems: Vec<Problem>,
@@ -218,7 +218,7 @@ impl Report {
         self.problems.append(&mut other.problems);
     }
 
-    /// All but the problems whose place is in one of these ranges of bytes.
+    /// Removes the problems whose place is in one of these byte ranges.
     #[must_use]
     pub fn without_those_in(mut self, ranges: &[Range<usize>]) -> Self {
         self.problems.retain(|problem| {
@@ -228,20 +228,20 @@ impl Report {
         self
     }
 
-    /// How much is wrong.
+    /// Number of problems.
     pub fn len(&self) -> usize {
         self.problems.len()
     }
 
-    /// Whether nothing is wrong.
+    /// Whether there are no problems.
     pub fn is_empty(&self) -> bool {
         self.problems.is_empty()
     }
 
-    /// `Ok(value)` if nothing is wrong.
+    /// Returns `Ok(value)` if there are no problems.
     ///
     /// # Errors
-    /// The report itself, its problems in the order of their places, if anything is.
+    /// The report with its problems in the order of their places, if there are any.
     pub fn into_result<T>(mut self, value: T) -> Result<T, Self> {
         if self.is_empty() {
             return Ok(value);
@@ -250,13 +250,13 @@ impl Report {
         Err(self)
     }
 
-    /// Every problem for a program: `{"errors": [{"file", "line", "column", "message", "label", "help"}]}`.
+    /// All problems as JSON: `{"errors": [{"file", "line", "column", "message", "label", "help"}]}`.
     pub fn json(&self) -> serde_json::Value {
         let errors: Vec<Entry<'_>> = self.problems.iter().map(Problem::entry).collect();
         serde_json::json!({ "errors": errors })
     }
 
-    /// Every problem as rustc prints errors, with colours if `styled`, and their number.
+    /// Formats all problems and their number as rustc does, with colours if `styled`.
     pub fn render(&self, styled: bool) -> String {
         let renderer = if styled {
             Renderer::styled()

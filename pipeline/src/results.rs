@@ -1,7 +1,7 @@
-//! Results of replays at scale: one recording gives one Parquet file, named by the hash of all that it depends on.
+//! Results of replays at scale: one Parquet file per recording, named by the hash of all its inputs.
 //!
-//! So the same work gives the same name and the same bytes, whoever does it and how often. A file that is there is
-//! whole, what is there need not be done again, and runners that meet do no harm.
+//! The same inputs therefore give the same name and the same bytes on every runner. An existing file is complete and
+//! need not be computed again, and concurrent runners do not interfere.
 
 mod compare;
 mod identity;

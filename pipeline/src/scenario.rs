@@ -1,4 +1,4 @@
-//! What a simulated source simulates: the scenario and its robot.
+//! Scenario and robot of a simulated source.
 
 use std::path::Path;
 
@@ -11,10 +11,10 @@ use crate::report::Report;
 use crate::urdf;
 use crate::yaml::{self, Place};
 
-/// A scenario and its robot, as they can be handed to another process.
+/// A scenario and its robot, in a form that can be sent to another process.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ScenarioFacts {
-    /// The scenario, its paths resolved.
+    /// The scenario with resolved paths.
     pub scenario: Scenario,
     /// The robot's URDF as text.
     pub urdf: String,
@@ -24,7 +24,7 @@ impl ScenarioFacts {
     /// Reads the scenario at `path` and the robot it names.
     ///
     /// # Errors
-    /// What is wrong with either, with its place.
+    /// All problems with either, with their places.
     pub fn load(path: &Path) -> Result<Self, Report> {
         let file = yaml::load::<Scenario>(path)?;
         let place = Place::root().key("robot");
@@ -40,10 +40,10 @@ impl ScenarioFacts {
         })
     }
 
-    /// What a simulated source is made of.
+    /// Builds the robot for a simulated source.
     ///
     /// # Errors
-    /// None after [`ScenarioFacts::load`], which reads the URDF too.
+    /// None after [`ScenarioFacts::load`], which already parses the URDF.
     pub fn robot(&self) -> Result<SimulatedRobot, ModelError> {
         Ok(SimulatedRobot {
             scenario: self.scenario.clone(),

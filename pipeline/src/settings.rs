@@ -1,4 +1,4 @@
-//! What a stage is told of its own.
+//! Settings of a stage.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::ZenohEndpoints;
 use tauscope_twin::TwinFile;
 
-/// What a stage is told of its own.
+/// Settings of a stage.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Settings {
@@ -15,78 +15,78 @@ pub enum Settings {
     Ingest(Box<tauscope_ingest::Config>),
     /// A twin.
     Twin {
-        /// From the pipeline file.
+        /// Settings from the pipeline file.
         config: tauscope_twin::Config,
-        /// The file that `model` names.
+        /// Content of the file that `model` names.
         model: Option<TwinFile>,
     },
     /// A detector.
     Detect {
-        /// From the pipeline file.
+        /// Settings from the pipeline file.
         config: Box<tauscope_detect::Config>,
-        /// The model of the twin it listens to, which holds what its threshold rests on.
+        /// The model of the twin it listens to, with the score statistics for its threshold.
         model: Option<TwinFile>,
     },
     /// A watch over a twin.
     Explain {
-        /// From the pipeline file.
+        /// Settings from the pipeline file.
         config: tauscope_watch::Config,
         /// The model of the twin it listens to.
         model: Option<TwinFile>,
-        /// That twin's low-pass on efforts \[Hz\].
+        /// Cutoff of that twin's low-pass on efforts \[Hz\].
         effort_cutoff_hz: f64,
     },
     /// A recorder.
     Record(tauscope_record::Config),
     /// A publisher.
     Publish {
-        /// From the pipeline file.
+        /// Settings from the pipeline file.
         config: tauscope_publish::Config,
-        /// Where the cell's source takes commands, if it does.
+        /// Command endpoints of the cell's source, if any.
         commands: Option<ZenohEndpoints>,
-        /// The twin and the archive of its cell, of which the fleet is told.
+        /// Twin and archive of its cell, reported to the fleet.
         beside: BesidePublisher,
     },
-    /// A program that is not ours.
+    /// An external program.
     Outside(OutsideEntry),
 }
 
-/// What stands beside a publisher in its cell.
+/// Twin and archive in the cell of a publisher.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct BesidePublisher {
     /// SHA-256 of the file of the twin.
     pub twin_sha256: Option<String>,
-    /// By joint name, the residual's standard deviation when that twin was calibrated \[effort unit\].
+    /// Standard deviation of the residual at the calibration of that twin, by joint name \[effort unit\].
     pub calibrated: BTreeMap<String, f64>,
-    /// Where the recorder writes.
+    /// Path pattern of the recorder's files.
     pub archive: Option<String>,
 }
 
-/// A stage that is not ours.
+/// A stage that is an external program.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OutsideEntry {
-    /// The program and its arguments. A program with a `/` in it is relative to the file, another one
-    /// is looked for as a shell would. It is run in the folder of the file and told its place in the
-    /// pipeline as one line of JSON on standard input.
+    /// The program and its arguments. A program with a `/` in it is relative to the file; otherwise it is searched in
+    /// `PATH`. It runs in the folder of the file and receives its place in the pipeline as one line of JSON on
+    /// standard input.
     #[schemars(length(min = 1))]
     pub command: Vec<String>,
-    /// What it puts out; left out where it puts out nothing.
+    /// Output sample type; left out for a program without output.
     #[serde(default)]
     pub output: Option<OutputEntry>,
-    /// Any text that the program is to be told, with its place.
+    /// Any settings for the program, sent together with its place in the pipeline.
     #[serde(default)]
     pub settings: Option<serde_json::Value>,
 }
 
-/// A kind of sample that a stage puts out.
+/// Output sample type of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OutputEntry {
-    /// What a robot says of itself.
+    /// Measured joint state of a robot.
     JointState,
-    /// What a twin makes of it.
+    /// Joint state with the twin's expected effort.
     TwinState,
-    /// A detector's verdict.
+    /// Result of a detector.
     Detection,
 }

@@ -1,5 +1,5 @@
-//! `summary.parquet` and `events.parquet`: the results over all replayed recordings, flat, so that
-//! any SQL tool reads them.
+//! `summary.parquet` and `events.parquet`: the results over all replayed recordings, as flat tables that any SQL tool
+//! reads.
 
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
@@ -15,10 +15,10 @@ use tauscope_archive::whole_file::{self, Existing};
 
 use crate::replay::Outcome;
 
-/// Why a table could not be written.
+/// Error while writing a table.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
-    /// The file system says no.
+    /// A failed write.
     #[error("cannot write {}: {source}", path.display())]
     Write {
         /// The file.
@@ -26,10 +26,10 @@ pub enum TableError {
         /// Why.
         source: std::io::Error,
     },
-    /// The columns do not fit together.
+    /// Inconsistent columns.
     #[error(transparent)]
     Arrow(#[from] ArrowError),
-    /// The table cannot be encoded.
+    /// A table that cannot be encoded.
     #[error(transparent)]
     Parquet(#[from] ParquetError),
 }
@@ -155,22 +155,22 @@ pub fn write_events(dir: &Path, outcomes: &[Outcome]) -> Result<(), TableError> 
     write_table(&dir.join("events.parquet"), columns)
 }
 
-/// A column of texts.
+/// A column of strings.
 pub fn strings(column: Vec<String>) -> ArrayRef {
     Arc::new(StringArray::from(column))
 }
 
-/// A column of counts.
+/// A column of unsigned integers.
 pub fn integers(column: Vec<u64>) -> ArrayRef {
     Arc::new(UInt64Array::from(column))
 }
 
-/// A column of numbers.
+/// A column of floats.
 pub fn floats(column: Vec<f64>) -> ArrayRef {
     Arc::new(Float64Array::from(column))
 }
 
-/// Writes the columns beside `path` and moves them there once they are whole.
+/// Writes the columns to a temporary file next to `path` and renames it when complete.
 ///
 /// # Errors
 /// If the table cannot be written.

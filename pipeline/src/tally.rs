@@ -1,9 +1,9 @@
-//! What a replay says of a recording: how far the twin was off, and what the detectors found.
+//! Statistics of a replayed recording: residuals of the twins and events of the detectors.
 
 use serde::Serialize;
 use tauscope_bus::{Contact, ContactFollower, Detection, EventKind, Name, TwinState, flags};
 
-/// A joint that is faster than this moves \[rad/s\].
+/// Velocity above which a joint is moving \[rad/s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MOVING_RAD_S: f64 = 0.01;
 
@@ -12,9 +12,9 @@ const MOVING_RAD_S: f64 = 0.01;
 pub struct TwinTally {
     /// The stage.
     pub stage: String,
-    /// Samples with an expected effort, and those of them in which some joint moves.
+    /// Number of samples with a measured effort.
     pub samples: u64,
-    /// See above.
+    /// Number of these samples in which some joint moves.
     pub moving_samples: u64,
     joints: Vec<JointSums>,
 }
@@ -29,16 +29,16 @@ struct JointSums {
 /// Root mean squares of one joint's residual, in the effort's unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct JointRms {
-    /// Measured less expected effort, not filtered, over all samples.
+    /// RMS of measured minus expected effort, unfiltered, over all samples.
     pub residual_rms: f64,
-    /// The same over the samples in which some joint moves.
+    /// RMS of measured minus expected effort, unfiltered, over the samples in which some joint moves.
     pub residual_rms_moving: f64,
-    /// Behind the twin's low-pass, over all samples.
+    /// RMS of the residual behind the twin's low-pass, over all samples.
     pub filtered_residual_rms: f64,
 }
 
 impl TwinTally {
-    /// Nothing summed yet, for the twin `stage` of an arm with so many joints.
+    /// Creates empty sums for the twin `stage` of an arm with `joint_count` joints.
     pub fn new(stage: &str, joint_count: usize) -> Self {
         Self {
             stage: stage.to_owned(),
@@ -67,7 +67,7 @@ impl TwinTally {
         }
     }
 
-    /// By joint in URDF order; NaN where there was no sample.
+    /// Root mean squares by joint in URDF order; NaN without samples.
     pub fn rms(&self) -> Vec<JointRms> {
         let root = |sum: f64, count: u64| (sum / count as f64).sqrt();
         self.joints
@@ -86,20 +86,20 @@ impl TwinTally {
 pub struct Event {
     /// Stamp of the sample that raised the alarm.
     pub t: f64,
-    /// Stamp of the sample that ended it, or of the recording's last.
+    /// Stamp of the sample that ended it, or of the recording's last sample.
     pub t_off: f64,
     /// Estimated beginning of the contact.
     pub t_contact: f64,
-    /// `contact`, `collision` or `cooperation`; of a change of the arm the effect's name, or `unknown`.
+    /// `contact`, `collision` or `cooperation`; for a change of the arm, the effect's name or `unknown`.
     pub kind: String,
-    /// The touched or changed link, where estimated.
+    /// The touched or changed link, if estimated.
     pub link: Option<String>,
-    /// The other link that it may as well have been, where the first is not sure.
+    /// The alternative link, if the first one is ambiguous.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other_link: Option<String>,
     /// The joints that detected.
     pub joints: Vec<String>,
-    /// Force on the robot in the world frame \[N\], where estimated; that of the sample with the largest score.
+    /// Force on the robot in the world frame at the sample with the largest score, if estimated \[N\].
     pub force: Option<[f64; 3]>,
     /// The largest score.
     pub peak_score: f64,
@@ -107,16 +107,16 @@ pub struct Event {
     pub size: Option<f64>,
 }
 
-/// Follows one detector.
+/// Statistics of one detector.
 #[derive(Debug, Clone)]
 pub struct DetectionTally {
     /// The stage.
     pub stage: String,
-    /// The detector's canonical name, once it has spoken.
+    /// The detector's canonical name, after its first sample.
     pub detector: String,
-    /// Samples it judged.
+    /// Number of samples it judged.
     pub judged: u64,
-    /// What it found.
+    /// Detected events.
     pub events: Vec<Event>,
     joint_names: Vec<String>,
     start_ns: Option<i64>,
@@ -124,7 +124,7 @@ pub struct DetectionTally {
 }
 
 impl DetectionTally {
-    /// Nothing found yet by the detector `stage` of an arm with these joints.
+    /// Creates empty statistics of the detector `stage` of an arm with these joints.
     pub fn new(stage: &str, joint_names: &[String]) -> Self {
         Self {
             stage: stage.to_owned(),
@@ -137,19 +137,19 @@ impl DetectionTally {
         }
     }
 
-    /// Counts seconds from this stamp on instead of the first sample's \[ns since the epoch\].
+    /// Sets the zero of times to this stamp instead of the first sample's \[ns since the epoch\].
     #[must_use]
     pub fn since(mut self, start_ns: i64) -> Self {
         self.start_ns = Some(start_ns);
         self
     }
 
-    /// The stamp that seconds count from \[ns since the epoch\], once there was a sample.
+    /// Zero of times, after the first sample \[ns since the epoch\].
     pub fn start_ns(&self) -> Option<i64> {
         self.start_ns
     }
 
-    /// Adds a sample: an event begins, goes on or ends.
+    /// Adds a sample, which begins, continues or ends an event.
     pub fn add(&mut self, sample: &Detection) {
         let start_ns = *self.start_ns.get_or_insert(sample.header.stamp_ns);
         if self.detector.is_empty() {
@@ -161,7 +161,7 @@ impl DetectionTally {
             self.events.push(self.event(&ended, start_ns));
         }
         if let Some(open) = self.contacts.open() {
-            // What began before is known better now.
+            // The estimates of the open event have improved.
             if sample.event() == EventKind::None {
                 self.events.pop();
             }

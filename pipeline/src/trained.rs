@@ -1,4 +1,4 @@
-//! Trained detectors on disk: written when one has been trained, read before its stage is built.
+//! Files of trained detectors: written after training, read before the stage is built.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -6,13 +6,13 @@ use std::sync::Arc;
 use tauscope_archive::whole_file::{self, Existing};
 use tauscope_detect::{Config, LearnError, Lessons, Setup, Trained, TrainedError};
 
-/// Ending of the files.
+/// File extension.
 const ENDING: &str = "safetensors";
 
-/// Why a trained detector cannot be had.
+/// Error while reading a trained detector.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainedFileError {
-    /// The file cannot be read.
+    /// An unreadable file.
     #[error("the trained detector {}: {source}", path.display())]
     Read {
         /// The file.
@@ -20,7 +20,7 @@ pub enum TrainedFileError {
         /// Why.
         source: std::io::Error,
     },
-    /// The file is no trained detector.
+    /// A file that is no trained detector.
     #[error("{}: {source}", path.display())]
     Format {
         /// The file.
@@ -50,7 +50,7 @@ pub fn read(config: &Config, setup: &mut Setup) -> Result<(), TrainedFileError> 
     Ok(())
 }
 
-/// Writes what was trained on `lessons` to `path`, to which the ending is added, and returns where it is.
+/// Writes a detector trained on `lessons` to `path` plus the file extension, and returns the full path.
 ///
 /// # Errors
 /// If it cannot be written.
@@ -78,7 +78,7 @@ pub fn write(
         )?)
     };
     match write() {
-        // Absolute: what names it is copied into pipeline files that lie anywhere.
+        // Absolute, because the path is copied into pipeline files in other folders.
         Ok(()) => Ok(std::path::absolute(&path).unwrap_or(path)),
         Err(error) => Err(LearnError::NotKept {
             path,

@@ -1,8 +1,8 @@
-//! The one loader for all files that people write: pipeline, twin, scenario.
+//! Common loader of all user-written files: pipeline, twin, scenario.
 //!
-//! A file is read, its shape checked against the schema of its type with every mismatch reported at
-//! its line and column, and only then turned into the type. What the schema cannot say is checked
-//! afterwards by those who know, who point into the same text through [`Located`].
+//! A file is read and checked against the schema of its type; every mismatch is reported with its line and column.
+//! Only then is it deserialised. Callers check further conditions and report errors in the same text through
+//! [`Located`].
 
 mod place;
 mod structure;
@@ -21,11 +21,11 @@ use place::Spans;
 
 use crate::report::{Problem, Report, Source};
 
-/// More than anybody writes by hand; what is larger is some other file.
+/// Largest accepted file \[bytes\], above any user-written one.
 /// Resolution: bounds memory.
 const LARGEST_FILE_BYTES: u64 = 4 << 20;
 
-/// A value, and where in its file each part of it stands.
+/// A value with the positions of its parts in the file.
 #[derive(Debug)]
 pub struct Located<T> {
     /// The value.
@@ -41,27 +41,27 @@ impl<T> Located<T> {
         &self.source.text
     }
 
-    /// A path as the file gives it: relative to the folder that the file is in.
+    /// Resolves a path relative to the folder of the file.
     pub fn resolve(&self, path: &Path) -> PathBuf {
         self.path.parent().unwrap_or(Path::new("")).join(path)
     }
 
-    /// A problem with the value at `place`, or with the nearest thing around it that is in the file.
+    /// Creates a problem at the value at `place`, or at the nearest enclosing value in the file.
     pub fn at(&self, place: &Place, title: impl Into<String>) -> Problem {
         Problem::at(&self.source, self.span(place), title)
     }
 
-    /// A problem with the key at `place` rather than its value.
+    /// Creates a problem at the key at `place` instead of its value.
     pub fn at_key(&self, place: &Place, title: impl Into<String>) -> Problem {
         Problem::at(&self.source, self.spans.key(place), title)
     }
 
-    /// Where the key at `place` stands \[bytes\].
+    /// Range of the key at `place` \[bytes\].
     pub fn key_span(&self, place: &Place) -> Range<usize> {
         self.spans.key(place)
     }
 
-    /// Where the value at `place` stands \[bytes\].
+    /// Range of the value at `place` \[bytes\].
     pub fn span(&self, place: &Place) -> Range<usize> {
         self.spans.value(place)
     }
@@ -70,28 +70,28 @@ impl<T> Located<T> {
 /// Reads `path` as a `T`.
 ///
 /// # Errors
-/// Everything that is wrong with the file's text and shape.
+/// All errors in the syntax and shape of the file.
 pub fn load<T: DeserializeOwned + JsonSchema>(path: &Path) -> Result<Located<T>, Report> {
     parse(path, read(path)?)
 }
 
-/// A file that can be looked at further although its shape is wrong in places.
+/// A file that can be checked further although parts of it have the wrong shape.
 #[derive(Debug)]
 pub struct Examined<T> {
-    /// The file, what is wrong left out of it.
+    /// The file without the mismatching parts.
     pub file: Located<T>,
-    /// What is wrong with its shape.
+    /// Mismatches of its shape.
     mismatches: Report,
-    /// The entries of its top in which something is.
+    /// Ranges of the top-level entries with a mismatch \[bytes\].
     entries: Vec<Range<usize>>,
 }
 
 impl<T> Examined<T> {
-    /// The file, if nothing is wrong.
+    /// Returns the file, if it has no errors.
     ///
     /// # Errors
-    /// What is wrong with its shape, and of `found`, which was found since, all that is not in an entry
-    /// whose shape is wrong: that may only follow from what was left out.
+    /// The mismatches of its shape, and the later problems `found` outside entries with a mismatch. Problems inside
+    /// such entries may only be consequences of the removed parts.
     pub fn into_sound(self, found: Report) -> Result<Located<T>, Report> {
         let mut report = self.mismatches;
         report.append(found.without_those_in(&self.entries));
@@ -99,11 +99,11 @@ impl<T> Examined<T> {
     }
 }
 
-/// As [`load`], but what is wrong with the shape of one entry does not keep the others from being
-/// looked at, so that everything wrong is found at once.
+/// Reads `path` as [`load`] does, but keeps the valid entries of a file with mismatches, so that all errors can be
+/// reported together.
 ///
 /// # Errors
-/// As [`load`], where the file makes no sense without what is wrong.
+/// As [`load`], if the file cannot be used without the mismatching parts.
 pub fn examine<T: DeserializeOwned + JsonSchema>(path: &Path) -> Result<Examined<T>, Report> {
     let source = Source::new(path, read(path)?);
     let (mut value, spans) = tree::parse(&source)?;
@@ -134,9 +134,9 @@ pub fn examine<T: DeserializeOwned + JsonSchema>(path: &Path) -> Result<Examined
     })
 }
 
-/// A value that the schema lets pass, as a `T`.
+/// Deserialises a value that matches the schema.
 ///
-/// The only place that deserialises a file: each further one doubles the code that is made to read all types.
+/// All files are deserialised here, because each further call site would instantiate the code for all types again.
 fn deserialize<T: DeserializeOwned>(
     value: &serde_json::Value,
     source: &Arc<Source>,
@@ -148,7 +148,7 @@ fn deserialize<T: DeserializeOwned>(
     })
 }
 
-/// The same from a text that was read from `path`.
+/// Parses a text that was read from `path` as a `T`.
 ///
 /// # Errors
 /// As [`load`].

@@ -1,6 +1,6 @@
-//! What every stage promises, whatever its role: twin, detectors and watch go through one suite.
+//! Properties common to all stages: one suite for twin, detectors and watch.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::collections::BTreeMap;
@@ -21,7 +21,7 @@ use tauscope_pipeline::cell::Cell;
 use tauscope_pipeline::pipeline::ROLE_KEYS;
 use tauscope_pipeline::report::Problem;
 
-/// The system's allocator, counting per thread.
+/// The system allocator with a counter per thread.
 struct Counting;
 
 thread_local! {
@@ -32,7 +32,7 @@ fn count() {
     ALLOCATIONS.with(|allocations| allocations.set(allocations.get() + 1));
 }
 
-// SAFETY: every call is passed on to the system's allocator as it came.
+// SAFETY: every call is forwarded unchanged to the system allocator.
 #[allow(
     unsafe_code,
     reason = "a global allocator is unsafe by its nature; test only"
@@ -55,12 +55,12 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 const RATE_HZ: i64 = 500;
-/// Long enough for every filter to settle and every window to fill \[samples\].
+/// Number of samples after which every filter has settled and every window is full.
 const WARM: usize = 2500;
-/// Long enough for the watch to learn what is usual, too \[samples\].
+/// Number of samples after which the watch has also learnt its baseline.
 const WARM_WATCH: usize = 15_000;
 
-/// Keeps what comes out, up to what was reserved.
+/// Collects the output, up to the reserved capacity.
 struct Kept<O>(Vec<O>);
 
 impl<O: Sample> Emit<O> for Kept<O> {
@@ -72,7 +72,7 @@ impl<O: Sample> Emit<O> for Kept<O> {
     }
 }
 
-/// A way to make a stage anew.
+/// Constructor of a stage.
 type Make<'a, I, O> = &'a dyn Fn() -> Box<dyn Stage<I, O>>;
 
 fn run<I: Sample, O: Sample>(make: Make<'_, I, O>, stream: &[I]) -> Vec<O> {
@@ -84,7 +84,7 @@ fn run<I: Sample, O: Sample>(make: Make<'_, I, O>, stream: &[I]) -> Vec<O> {
     out.0
 }
 
-/// Seven joints that swing, each at a frequency of its own.
+/// Seven joints that oscillate at different frequencies.
 fn motion(count: usize, rate_hz: i64) -> Vec<JointState> {
     let period_ns = 1_000_000_000 / rate_hz;
     let sample = |i: usize| {
@@ -105,7 +105,7 @@ fn motion(count: usize, rate_hz: i64) -> Vec<JointState> {
     (0..count).map(sample).collect()
 }
 
-/// The suite. `stream` turns a motion into what the stage takes.
+/// Runs the suite. `stream` converts a motion to the input of the stage.
 fn keeps_its_promises<I: Sample, O: Sample>(
     name: &str,
     warm: usize,
@@ -177,7 +177,7 @@ fn allocates_nothing<I: Sample, O: Sample>(
     );
 }
 
-/// Whatever came before, at the end the stage works as ever and nothing that it says is NaN.
+/// Checks that the stage is ready at the end of the input and that the stamps of its output increase.
 fn ends_ready<I: Sample, O: Sample>(name: &str, what: &str, make: Make<'_, I, O>, input: &[I]) {
     let out = run(make, input);
     let last = out.last().unwrap();
@@ -191,7 +191,7 @@ fn ends_ready<I: Sample, O: Sample>(name: &str, what: &str, make: Make<'_, I, O>
     assert!(stamps, "{name}: time runs backwards in {what}");
 }
 
-/// Every number of a sample but its header becomes NaN.
+/// Sets every number of a sample except its header to NaN.
 fn poison<T: Sample>(sample: &mut T) {
     let header = *sample.header();
     for number in bytemuck::cast_slice_mut::<u8, u64>(bytemuck::bytes_of_mut(sample)) {
@@ -228,14 +228,14 @@ fn every_stage_is_deterministic_allocates_nothing_and_gets_over_gaps_nan_rates_a
                 };
                 keeps_its_promises(role, WARM_WATCH, &make, &behind_twin);
             }
-            // A source, two sinks, and a program that is not ours.
+            // A source, two sinks, and an external program.
             "ingest" | "record" | "publish" | "outside" => {}
             other => panic!("no promises are held to a `{other}` stage"),
         }
     }
 }
 
-/// Every detector of the table that runs without having learnt; the others are refused before they start.
+/// Runs the suite for every detector of the table that works without training; the others are refused at the start.
 fn detectors(cell: &Cell, stream: &dyn Fn(&[JointState]) -> Vec<TwinState>) {
     let mut judged = 0;
     for entry in DETECTORS {
@@ -262,7 +262,7 @@ fn detectors(cell: &Cell, stream: &dyn Fn(&[JointState]) -> Vec<TwinState>) {
     );
 }
 
-/// Plays a motion, and counts what is allocated once the stages behind it are warm.
+/// Plays a motion and counts the allocations after the warm-up of the stages behind it.
 struct Player {
     motion: Vec<JointState>,
     next: usize,
@@ -327,7 +327,7 @@ fn from_source_to_alarm_nothing_is_allocated_for_a_sample() {
     let tree = Tree::of_source(&turn, post("play", ""), Box::new(player), out);
     let reports = tree.run(&Context::new("play"));
     assert_eq!(reports[2].received, samples as u64);
-    // Ten times a second the stages report.
+    // The stages report ten times a second.
     let allocated = allocated.load(Ordering::Relaxed);
     assert!(allocated < samples / 20, "{allocated} in {samples} samples");
 }

@@ -1,4 +1,4 @@
-//! The joint states of a recording as one table: a row a message, three columns a joint.
+//! Joint states of a recording as one table: one row per message, three columns per joint.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -11,35 +11,35 @@ use pyo3::PyErr;
 use tauscope_archive::ros::JointState;
 use tauscope_archive::{ArchiveError, Recording};
 
-/// Messages between two questions whether to go on.
+/// Messages between two checks for an interrupt.
 const STRIDE: usize = 4096;
-/// What stands behind a joint's name in the names of its columns.
+/// Suffixes of a joint's name in the names of its columns.
 const QUANTITIES: [&str; 3] = ["position", "velocity", "effort"];
 
-/// Why there is no table.
+/// Reason why there is no table.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The recording cannot be read.
     #[error(transparent)]
     Archive(#[from] ArchiveError),
-    /// Which topic is meant is for the caller to say.
+    /// The topic is ambiguous or missing; the caller must name one.
     #[error("{path}: {found}; name one with `topic`")]
     Topic {
         /// The recording.
         path: String,
-        /// What is there.
+        /// Topics of the recording.
         found: String,
     },
     /// The columns do not fit together.
     #[error(transparent)]
     Arrow(#[from] ArrowError),
-    /// The caller has had enough: its own exception.
+    /// The caller interrupted the reading; its own exception.
     #[error(transparent)]
     Stopped(PyErr),
 }
 
 impl ReadError {
-    /// The line of a table that is wrong, from 1.
+    /// Number of the wrong line of a table, from 1.
     pub fn line(&self) -> Option<u64> {
         match self {
             Self::Archive(ArchiveError::Csv(error)) => Some(error.line),
@@ -48,17 +48,17 @@ impl ReadError {
     }
 }
 
-/// What was read.
+/// Joint states of a recording.
 pub struct Read {
-    /// `stamp_ns`, then three columns a joint.
+    /// `stamp_ns`, then three columns per joint.
     pub batch: RecordBatch,
-    /// Where it stood.
+    /// Topic of the joint states.
     pub topic: String,
-    /// A sentence for each thing that was lost.
+    /// One sentence per loss.
     pub lost: Vec<String>,
 }
 
-/// Values of one column; a message that does not have it leaves a null.
+/// Values of one column; null in a message without it.
 #[derive(Default)]
 struct Column {
     values: Vec<f64>,
@@ -66,7 +66,7 @@ struct Column {
 }
 
 impl Column {
-    /// Writes the value of message number `row`, from 0. A joint named twice keeps its first value.
+    /// Writes the value of message number `row`, from 0. If a joint is named twice, the first value is kept.
     fn put(&mut self, row: usize, value: f64) {
         if self.values.len() <= row {
             self.fill(row);
@@ -88,11 +88,11 @@ impl Column {
     }
 }
 
-/// The columns as they grow.
+/// Columns under construction.
 #[derive(Default)]
 struct Columns {
     stamps_ns: Vec<i64>,
-    /// In the order in which they first appear.
+    /// In the order of their first appearance.
     joints: Vec<(String, [Column; 3])>,
     places: HashMap<String, usize>,
 }
@@ -132,11 +132,11 @@ impl Columns {
     }
 }
 
-/// Reads the joint states on `topic`; without one, on the only topic that has them, or on `/joint_states`. From time to
-/// time it asks `may_go_on`.
+/// Reads the joint states on `topic`; without one, on the only topic that has them, or on `/joint_states`. Calls
+/// `may_go_on` from time to time.
 ///
 /// # Errors
-/// If there are none, or if the caller does not go on.
+/// If there are none, or if the caller interrupts the reading.
 pub fn read(
     path: &Path,
     topic: Option<&str>,
@@ -176,7 +176,7 @@ pub fn read(
     Ok(Read { batch, topic, lost })
 }
 
-/// The topic that is meant where none is named.
+/// The default topic.
 fn only_topic(recording: &Recording) -> Result<String, ReadError> {
     const USUAL: &str = "/joint_states";
     let topics = recording.topics().iter();

@@ -1,5 +1,5 @@
-//! The compiled half of the Python module `tauscope`: tables as Arrow, recordings read into them, and one command in a
-//! process of its own. The other half, which users see, is `python/tauscope/*.py`.
+//! Compiled part of the Python module `tauscope`: tables as Arrow, recordings read into them, and one command in a
+//! separate process. The public part is `python/tauscope/*.py`.
 
 mod joint_states;
 mod table;
@@ -13,9 +13,9 @@ use pyo3::prelude::*;
 use joint_states::ReadError;
 use table::Table;
 
-/// Reads the joint states of a recording; the table, the topic, and a sentence for each thing that was lost.
+/// Reads the joint states of a recording; returns the table, the topic, and one sentence per loss.
 ///
-/// Raises `ValueError(message, file, line)` where nothing can be read.
+/// Raises `ValueError(message, file, line)` if nothing can be read.
 #[pyfunction]
 #[expect(
     clippy::needless_pass_by_value,
@@ -26,7 +26,7 @@ fn read_joint_states(
     path: PathBuf,
     topic: Option<String>,
 ) -> PyResult<(Table, String, Vec<String>)> {
-    // Ctrl-C is noted by the interpreter, which must be asked for it.
+    // Ctrl-C sets a flag in the interpreter, which must be polled.
     #[expect(
         clippy::redundant_closure_for_method_calls,
         reason = "the method is not general enough over lifetimes"
@@ -54,8 +54,8 @@ fn read_parquet(py: Python<'_>, path: PathBuf) -> PyResult<Table> {
         .map_err(|error| PyValueError::new_err(format!("{}: {error}", path.display())))
 }
 
-/// Runs a command; the process is there for it alone. Exit code, standard output, what was said to people, and
-/// what is wrong with files as JSON.
+/// Runs a command, for which the process was started. Returns the exit code, the standard output, the messages for
+/// people, and errors in files as JSON.
 #[pyfunction]
 fn command(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<(u8, String, String, String)> {
     let answer = py.detach(|| tauscope::answer_alone(arguments))?;

@@ -1,4 +1,4 @@
-//! A table in Arrow's memory layout, handed over through the Arrow `PyCapsule` interface without copying
+//! A table in Arrow's memory layout, exported through the Arrow `PyCapsule` interface without copying
 //! (<https://arrow.apache.org/docs/format/CDataInterface/PyCapsuleInterface.html>).
 
 use std::fs::File;
@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
 
 /// Columns of equal length in Arrow's layout. `pyarrow.table`, `polars.from_arrow`, `duckdb` and every other library
-/// that knows the Arrow `PyCapsule` interface takes it without a copy.
+/// with the Arrow `PyCapsule` interface read it without a copy.
 #[pyclass(module = "tauscope", frozen)]
 #[derive(Debug)]
 pub struct Table {
@@ -25,7 +25,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// One batch as a table.
+    /// Creates a table of one batch.
     pub fn of(batch: RecordBatch) -> Self {
         Self {
             schema: batch.schema(),
@@ -36,7 +36,7 @@ impl Table {
 
 #[pymethods]
 impl Table {
-    /// A table of text.
+    /// Creates a table of text.
     #[staticmethod]
     fn of_text(names: Vec<String>, columns: Vec<Vec<String>>) -> PyResult<Self> {
         let arrays = columns
@@ -46,7 +46,7 @@ impl Table {
         Ok(Self::of(batch))
     }
 
-    /// A table of names and, for each name, a number from every column; `None` is null.
+    /// Creates a table of names and, for each name, a number from every column; `None` is null.
     #[staticmethod]
     fn of_numbers(
         key: String,
@@ -99,14 +99,14 @@ impl Table {
         PyCapsule::new(py, schema, Some(c"arrow_schema".to_owned()))
     }
 
-    /// The data, as an `ArrowArrayStream`. The schema is the table's own, whatever is asked for.
+    /// The data, as an `ArrowArrayStream`. The schema is always the table's own; a requested schema is ignored.
     #[pyo3(signature = (requested_schema=None))]
     fn __arrow_c_stream__<'py>(
         &self,
         py: Python<'py>,
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
-        // The interface leaves it to the producer whether a wish can be met; the consumer casts then.
+        // The interface allows a producer to ignore the requested schema; the consumer then casts.
         drop(requested_schema);
         // Clones share the buffers.
         let batches = self.batches.clone().into_iter().map(Ok);
@@ -121,21 +121,21 @@ fn refused(error: ArrowError) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// Why a Parquet file cannot be read.
+/// Reason why a Parquet file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ParquetFailure {
-    /// The file system says no.
+    /// The file cannot be opened.
     #[error("cannot open: {0}")]
     Open(#[from] std::io::Error),
-    /// It is no sound Parquet file.
+    /// The file is not valid Parquet.
     #[error(transparent)]
     Parquet(#[from] parquet::errors::ParquetError),
-    /// Its columns make no table.
+    /// The columns do not form a table.
     #[error(transparent)]
     Arrow(#[from] ArrowError),
 }
 
-/// All of a Parquet file.
+/// Reads a Parquet file.
 ///
 /// # Errors
 /// If it cannot be read.

@@ -1,4 +1,4 @@
-//! What a query asks of recordings, as far as it saves reading.
+//! Filters of a query that reduce the data to read.
 
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
@@ -8,7 +8,7 @@ use datafusion::logical_expr::expr::InList;
 use datafusion::logical_expr::{BinaryExpr, Expr, Operator};
 use serde::{Deserialize, Serialize};
 
-/// A bound on what has to be read. What is read beyond it, `DataFusion` filters.
+/// An upper bound on the rows that are read; `DataFusion` filters the remaining ones.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Asked {
     /// Log times of messages \[ns since the epoch\], both ends included.
@@ -20,7 +20,7 @@ pub struct Asked {
 }
 
 impl Default for Asked {
-    /// All.
+    /// No filter.
     fn default() -> Self {
         Self {
             log_ns: i64::MIN..=i64::MAX,
@@ -31,7 +31,7 @@ impl Default for Asked {
 }
 
 impl Asked {
-    /// From the terms of a WHERE, all of which hold.
+    /// Derives the bound from the conjunctive terms of a WHERE clause.
     pub fn of(filters: &[Expr]) -> Self {
         let mut asked = Self::default();
         for filter in filters {
@@ -40,19 +40,19 @@ impl Asked {
         asked
     }
 
-    /// Whether a term of a WHERE saves reading.
+    /// Whether a term of a WHERE clause reduces the data to read.
     pub fn takes(filter: &Expr) -> bool {
         Self::default().add(filter)
     }
 
-    /// Whether a recording of this name is asked for.
+    /// Whether the bound includes a recording of this name.
     pub fn wants(&self, recording: &str) -> bool {
         self.recordings
             .as_ref()
             .is_none_or(|names| names.contains(recording))
     }
 
-    /// Takes a term in; false if it saves nothing.
+    /// Adds a term; false if it does not reduce the data to read.
     fn add(&mut self, filter: &Expr) -> bool {
         match filter {
             Expr::BinaryExpr(BinaryExpr {
@@ -70,7 +70,7 @@ impl Asked {
                 (Expr::Literal(value, _), Expr::Column(column)) => op
                     .swap()
                     .is_some_and(|op| self.compare(&column.name, op, value)),
-                // One of two: DataFusion writes a short IN so.
+                // A disjunction: DataFusion writes a short IN in this form.
                 _ => *op == Operator::Or && self.either(filter),
             },
             Expr::Between(between) if !between.negated => {

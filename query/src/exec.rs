@@ -22,12 +22,12 @@ use crate::asked::Asked;
 use crate::scan::{Counts, Kind, Scan};
 use crate::{joints, recordings, replay};
 
-/// Batches that wait for whoever asked.
+/// Batches buffered for the consumer.
 /// Resolution: memory, against threads that wait for each other.
 const WAITING: usize = 2;
 
 impl Kind {
-    /// The columns.
+    /// Schema of the table.
     pub fn schema(&self) -> SchemaRef {
         match self {
             Self::Recordings => recordings::schema(),
@@ -37,7 +37,7 @@ impl Kind {
     }
 }
 
-/// Reads recordings.
+/// Plan node that reads recordings.
 #[derive(Debug)]
 pub struct ArchiveExec {
     scan: Scan,
@@ -46,10 +46,10 @@ pub struct ArchiveExec {
 }
 
 impl ArchiveExec {
-    /// The plan of a scan.
+    /// Creates the plan node of a scan.
     ///
     /// # Errors
-    /// If there is no such column.
+    /// If a projected column does not exist.
     pub fn new(scan: Scan) -> Result<Self> {
         let properties = PlanProperties::new(
             EquivalenceProperties::new(scan.projected(&scan.kind.schema())?),
@@ -64,7 +64,7 @@ impl ArchiveExec {
         })
     }
 
-    /// What is read.
+    /// The scan of this node.
     pub fn scan(&self) -> &Scan {
         &self.scan
     }
@@ -151,7 +151,7 @@ impl ExecutionPlan for ArchiveExec {
                 let batch = batch.slice(0, batch.num_rows().min(left));
                 left -= batch.num_rows();
                 baseline.record_output(batch.num_rows());
-                // Whoever asked may have enough, and be gone.
+                // The consumer may have enough rows and have dropped the channel.
                 sender.blocking_send(Ok(batch)).is_ok() && left > 0
             };
             let read = match &scan.kind {

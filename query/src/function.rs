@@ -13,8 +13,8 @@ use crate::scan::{Kind, external};
 use crate::sources;
 use crate::table::ArchiveTable;
 
-/// The table function. Its arguments: pipeline file, recordings, and where the pipeline has several sources, the one
-/// whose place they take.
+/// The table function `replay`. Its arguments are the pipeline file, the recordings and, if the pipeline has several
+/// sources, the source that the recordings replace.
 #[derive(Debug)]
 pub struct ReplayFunction;
 
@@ -32,7 +32,7 @@ impl TableFunctionImpl for ReplayFunction {
         };
         let path = std::path::absolute(pipeline)?;
         let loaded = Loaded::load(Path::new(pipeline))?;
-        // Told before anything is read.
+        // Reports errors before anything is read.
         loaded.replay(source.as_deref())?;
         Ok(Arc::new(ArchiveTable {
             kind: Kind::Replay {

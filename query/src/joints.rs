@@ -18,14 +18,14 @@ use crate::scan::{Counts, Listed, Scan, external, open};
 /// Resolution: memory, against the cost of a batch.
 const BATCH_ROWS: usize = 8192;
 
-/// Places of columns in [`schema`].
+/// Indices of columns in [`schema`].
 const RECORDING: usize = 0;
 const LOG_NS: usize = 2;
 const JOINT: usize = 4;
 const POSITION: usize = 5;
 const VELOCITY: usize = 6;
 
-/// The columns.
+/// Schema of the table.
 pub(crate) fn schema() -> SchemaRef {
     let text = |name| Field::new(name, DataType::Utf8, false);
     let stamp = |name| Field::new(name, DataType::Int64, false);
@@ -42,7 +42,7 @@ pub(crate) fn schema() -> SchemaRef {
     ]))
 }
 
-/// Gives the joint states of recordings, batch by batch, until `give` says that it is enough.
+/// Passes the joint states of recordings on, batch by batch, until `give` returns false.
 pub(crate) fn read(
     listed: &[Listed],
     scan: &Scan,
@@ -63,7 +63,7 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// Whether more is wanted.
+/// Reads one recording; returns whether more rows are needed.
 fn read_one(
     recording: &Recording,
     scan: &Scan,
@@ -95,7 +95,7 @@ fn read_one(
     let mut on = true;
     while let Some(message) = messages.next_message() {
         let pushed = message.and_then(|message| {
-            // Topics of one name may have several types.
+            // Topics with the same name may have several types.
             if message.topic.joint_state_type().is_some() {
                 message.joint_state_into(&mut decoder, &mut state)?;
                 rows.push(message.log_time_ns, &message.topic.name, &state);
@@ -104,7 +104,7 @@ fn read_one(
         });
         match pushed {
             Ok(()) => {}
-            // What lies behind it can be read.
+            // The part after the damage can still be read.
             Err(error) if error.damage().is_some() => eprintln!("warning: {error}"),
             Err(error) => return Err(external(error)),
         }
@@ -123,19 +123,19 @@ fn read_one(
     Ok(on)
 }
 
-/// A column that is asked for.
+/// A projected column.
 enum Column {
     Text(StringBuilder),
     Stamp(Int64Builder),
     Number(Float64Builder),
 }
 
-/// Rows that grow: only the columns that are asked for.
+/// Rows under construction, with the projected columns only.
 struct Rows {
     recording: String,
     count: usize,
     schema: SchemaRef,
-    /// With the place of each in [`schema`].
+    /// Columns, each with its index in [`schema`].
     columns: Vec<(usize, Column)>,
 }
 
@@ -206,7 +206,7 @@ impl Rows {
             Column::Stamp(column) => Arc::new(column.finish()),
             Column::Number(column) => Arc::new(column.finish()),
         });
-        // Without a column, as count(*) asks, the number of rows is all there is.
+        // Without a column, as for count(*), the batch has only a number of rows.
         let options = RecordBatchOptions::new().with_row_count(Some(self.count));
         let batch = RecordBatch::try_new_with_options(
             Arc::clone(&self.schema),

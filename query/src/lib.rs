@@ -1,7 +1,7 @@
 //! SQL over archives and over the results of replays.
 //!
-//! [`session`] gives a `DataFusion` session with the tables, [`answer`] runs a query in it. What reads recordings is one
-//! table provider, [`ArchiveTable`], and one leaf of the plan, [`ArchiveExec`]; both are made of plain data, so that a
+//! [`session`] creates a `DataFusion` session with the tables, [`answer`] runs a query in it. Recordings are read by
+//! one table provider, [`ArchiveTable`], and one leaf of the plan, [`ArchiveExec`]; both are plain data, so that a
 //! cluster can send them.
 
 mod asked;
@@ -35,7 +35,7 @@ pub use table::ArchiveTable;
 /// Registers the tables over `paths` and the function `replay` in a session.
 ///
 /// # Errors
-/// If a path is neither recording nor result, or cannot be read.
+/// If a path is neither a recording nor a result, or cannot be read.
 pub async fn register(context: &SessionContext, paths: &[PathBuf]) -> Result<(), Report> {
     let sources = Sources::of(paths)?;
     table::register(context, &sources.recordings)?;
@@ -45,10 +45,10 @@ pub async fn register(context: &SessionContext, paths: &[PathBuf]) -> Result<(),
     Ok(())
 }
 
-/// The plan of a query over the registered tables.
+/// Plans a query over the registered tables.
 ///
 /// # Errors
-/// What is wrong with the query, where, and what would mend it.
+/// If the query is invalid; with the place of the error and a remedy.
 pub async fn plan(context: &SessionContext, sql: &str) -> Result<DataFrame, Report> {
     let frame = context.sql(sql).await;
     frame.map_err(|error| problem::of_query(context, sql, &error))

@@ -1,4 +1,4 @@
-//! The answer, as a table for people or as a file.
+//! Output of the answer, as a table for people or as a file.
 
 use std::fs::File;
 use std::io::{IsTerminal as _, Write};
@@ -17,7 +17,7 @@ use parquet::file::properties::WriterProperties;
 use tauscope_archive::whole_file::{self, Existing};
 use tauscope_pipeline::report::{Problem, Report};
 
-/// How an answer is written.
+/// Format of the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum Format {
     /// A table for people.
@@ -31,25 +31,25 @@ pub enum Format {
     Arrow,
 }
 
-/// Where the answer goes, and how.
+/// Destination and format of the answer.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct Answer {
-    /// How the answer is written.
+    /// Format of the answer.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
     /// The file of the answer; without it, standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace the file of the answer if it is there.
+    /// Overwrite an existing file of the answer.
     #[arg(long)]
     force: bool,
 }
 
 impl Answer {
-    /// Whether an answer of this format can go there.
+    /// Checks that an answer of this format can be written to this destination.
     ///
     /// # Errors
-    /// If it is not for a terminal and no file is named, or the file is there already.
+    /// If a binary format would go to the terminal, or the file exists already.
     pub fn check(&self) -> Result<(), Report> {
         match &self.out {
             None if matches!(self.format, Format::Parquet | Format::Arrow)
@@ -68,14 +68,15 @@ impl Answer {
         }
     }
 
-    /// Writes the rows as they come; a table for people once all are there. A file gets its name once it is whole.
+    /// Writes the rows as they arrive, or, as a table for people, all at once. A file gets its final name when it is
+    /// complete.
     ///
     /// # Errors
     /// If the query fails or the file cannot be written.
     pub async fn write(&self, frame: DataFrame) -> anyhow::Result<()> {
         let Some(path) = &self.out else {
             return match self.to(frame, std::io::stdout()).await {
-                // A reader that has enough, as `head` has, is no failure.
+                // A reader that closes the pipe early, like `head`, is not an error.
                 Err(error) if is_broken_pipe(&error) => Ok(()),
                 written => written,
             };
@@ -83,7 +84,7 @@ impl Answer {
         let part = whole_file::part_of(path);
         let file = File::create(&part).with_context(|| part.display().to_string())?;
         if let Err(error) = self.to(frame, file).await {
-            // Why there is no answer is what is told.
+            // The error of the query is reported, not that of removing the file.
             let _ = std::fs::remove_file(&part);
             return Err(error);
         }
@@ -115,11 +116,11 @@ fn is_broken_pipe(error: &anyhow::Error) -> bool {
         let io = cause.downcast_ref::<std::io::Error>();
         io.is_some_and(|io| io.kind() == std::io::ErrorKind::BrokenPipe)
     };
-    // Arrow keeps the text of some.
+    // Arrow keeps only the text of some errors.
     error.chain().any(is) || error.to_string().contains("Broken pipe")
 }
 
-/// Writes batch by batch.
+/// Writer of the rows, batch by batch.
 enum Rows<W: Write + Send> {
     Json(LineDelimitedWriter<W>),
     Parquet(ArrowWriter<W>),

@@ -1,4 +1,4 @@
-//! What is wrong with a query: where, and what would mend it.
+//! Error reports of a query, with the place of the error and a remedy.
 
 use std::ops::Range;
 use std::path::Path;
@@ -14,9 +14,9 @@ use crate::results;
 /// Tables of archives.
 const OF_ARCHIVES: [&str; 2] = ["recordings", "joints"];
 
-/// In the words of the query's author.
+/// Reports an error in the terms of the query.
 pub(crate) fn of_query(context: &SessionContext, sql: &str, error: &DataFusionError) -> Report {
-    // Wrong files, which a table function was given.
+    // Invalid files passed to a table function.
     if let Some(report) = report_in(error) {
         return report.clone();
     }
@@ -48,7 +48,7 @@ pub(crate) fn of_query(context: &SessionContext, sql: &str, error: &DataFusionEr
     at(sql, place, plain(title)).into()
 }
 
-/// Why an answer broke off, in one line.
+/// Reason of an aborted answer, in one line.
 pub fn of_answer(error: &anyhow::Error) -> String {
     match error.downcast_ref::<DataFusionError>() {
         Some(inner) => plain(&inner.strip_backtrace()),
@@ -74,7 +74,7 @@ fn at(sql: &str, place: Option<Range<usize>>, title: impl Into<String>) -> Probl
     }
 }
 
-/// The message without the names of `DataFusion`'s types around it.
+/// The message without the enclosing names of `DataFusion`'s types.
 fn plain(title: &str) -> String {
     let wrappers = [
         "Error during planning: ",
@@ -99,7 +99,7 @@ fn plain(title: &str) -> String {
         .replace("\\\"", "\"")
 }
 
-/// Of `table 'datafusion.public.event' not found`.
+/// Name of the table in `table 'datafusion.public.event' not found`.
 fn missing_table(text: &str) -> Option<&str> {
     let (_, rest) = text.split_once("table '")?;
     let (name, rest) = rest.split_once('\'')?;
@@ -132,7 +132,7 @@ fn remedy(context: &SessionContext, name: &str) -> String {
     }
 }
 
-/// Where `name` stands in the query as a table: behind FROM or JOIN, else anywhere.
+/// Place of `name` in the query as a table: after FROM or JOIN, otherwise anywhere.
 fn place_of_table(sql: &str, name: &str) -> Option<Range<usize>> {
     let behind = |place: &Range<usize>| {
         let before = sql[..place.start].trim_end().to_ascii_lowercase();
@@ -147,7 +147,7 @@ fn place_of_word(sql: &str, word: &str) -> Option<Range<usize>> {
     places_of_word(sql, word).next()
 }
 
-/// Where `word` stands in the query as a word of its own.
+/// Places of `word` in the query as a whole word.
 fn places_of_word(sql: &str, word: &str) -> impl Iterator<Item = Range<usize>> {
     let is_part = |c: char| c.is_alphanumeric() || c == '_';
     let lower = sql.to_ascii_lowercase();
@@ -161,7 +161,7 @@ fn places_of_word(sql: &str, word: &str) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// Of `1, Column: 8`.
+/// Place in the query of `1, Column: 8`.
 fn place_of_line(sql: &str, place: &str) -> Option<Range<usize>> {
     let (line, column) = place.split_once(", Column: ")?;
     let column: String = column.chars().take_while(char::is_ascii_digit).collect();

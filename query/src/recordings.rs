@@ -1,4 +1,4 @@
-//! The table `recordings`: what there is, from the index of each file.
+//! The table `recordings`: a row for each recording, from the index of its file.
 
 use std::sync::Arc;
 
@@ -11,10 +11,10 @@ use tauscope_pipeline::replay::stem;
 use crate::scan::{Counts, Listed, Scan, open};
 
 /// Rows of a batch.
-/// Resolution: how soon the first come, against the cost of a batch.
+/// Resolution: latency of the first rows, against the cost of a batch.
 const BATCH_ROWS: usize = 256;
 
-/// The columns.
+/// Schema of the table.
 pub(crate) fn schema() -> SchemaRef {
     let text = |name| Field::new(name, DataType::Utf8, false);
     let stamp = |name| Field::new(name, DataType::Int64, true);
@@ -32,7 +32,7 @@ pub(crate) fn schema() -> SchemaRef {
     ]))
 }
 
-/// Gives a row for each recording.
+/// Passes a row for each recording on.
 pub(crate) fn read(
     listed: &[Listed],
     scan: &Scan,

@@ -1,4 +1,4 @@
-//! Recordings replayed as a query asks: the rows that `tauscope replay --manifest` writes.
+//! Replay of the recordings of a query: the rows that `tauscope replay --manifest` writes.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use tauscope_pipeline::results::{Folder, Identity, Unit, Wanted, parquet_files};
 
 use crate::scan::{Counts, Kind, Listed, Scan, external, open};
 
-/// A pipeline, and what its results depend on.
+/// A pipeline with the identity of everything that its results depend on.
 pub(crate) struct Loaded {
     pipeline: Pipeline,
     pub(crate) identity: Identity,
@@ -31,7 +31,8 @@ impl Loaded {
     }
 }
 
-/// Replays recordings one after the other and gives their rows. `gone` tells that nobody wants them any more.
+/// Replays recordings one after the other and passes their rows on. `gone` reports that the consumer needs no more
+/// rows.
 pub(crate) fn read(
     listed: &[Listed],
     scan: &Scan,
@@ -63,7 +64,7 @@ pub(crate) fn read(
         open(one, counts)?;
         let failed = |error: String| external(format!("{}: {error}", one.path.display()));
         let wanted = Wanted::of(&one.path, source.as_deref()).map_err(failed)?;
-        // One folder for each, so that what lies in it is this recording's.
+        // One folder per recording, so that its contents belong to this recording only.
         let out = folder.path().join(number.to_string());
         let unit = Unit {
             replay: &replay,
@@ -86,7 +87,7 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// Whether more is wanted.
+/// Passes the rows of a file on; returns whether more rows are needed.
 fn give_file(
     path: &PathBuf,
     scan: &Scan,
@@ -97,7 +98,7 @@ fn give_file(
         Some(columns) => ProjectionMask::roots(builder.parquet_schema(), columns.iter().copied()),
         None => ProjectionMask::all(),
     };
-    // The file has its columns in their own order, the query may want another.
+    // The query may need the columns in another order than the file.
     let order = scan.projection.as_ref().map(|columns| {
         let mut sorted = columns.clone();
         sorted.sort_unstable();

@@ -10,7 +10,7 @@ use tauscope_pipeline::results::schema;
 /// The table of all rows.
 const ALL: &str = "results";
 
-/// Each view: its name, the value of the column `row`, and its columns.
+/// Each view: name, value of the column `row`, and columns.
 const VIEWS: [(&str, &str, &str); 5] = [
     (
         "replays",
@@ -48,10 +48,10 @@ pub(crate) fn names() -> impl Iterator<Item = &'static str> {
     VIEWS.iter().map(|(name, ..)| *name).chain([ALL])
 }
 
-/// Registers the tables over these files.
+/// Registers the views over these files.
 ///
 /// # Errors
-/// If one cannot be read.
+/// If a file cannot be read.
 pub(crate) async fn register(context: &SessionContext, files: &[PathBuf]) -> Result<(), Report> {
     if files.is_empty() {
         return Ok(());

@@ -1,4 +1,4 @@
-//! What is read of which recordings, as plain data, and what all who read have in common.
+//! Description of a scan of recordings as plain data, and the functions that all scans share.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -11,56 +11,56 @@ use tauscope_archive::Recording;
 
 use crate::asked::Asked;
 
-/// What is read from recordings.
+/// Kind of rows read from recordings.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Kind {
     /// A row for each recording.
     Recordings,
     /// A row for each joint of each joint state.
     Joints,
-    /// The rows of `docs/results.md`.
+    /// The rows described in `docs/results.md`, from a replay.
     Replay {
         /// The pipeline file.
         pipeline: PathBuf,
-        /// The stage whose place the recordings take, where the pipeline has several sources.
+        /// Source stage that the recordings replace, if the pipeline has several.
         source: Option<String>,
-        /// Hash of all that the results depend on but for the recording
-        /// ([`Identity::hash`](results::Identity::hash)): whoever replays checks that it has the same.
+        /// Hash of everything that the results depend on except the recording
+        /// ([`Identity::hash`](results::Identity::hash)). The executor compares it with its own.
         identity: String,
     },
 }
 
-/// A recording as a plan names it.
+/// A recording in a plan.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Listed {
-    /// From the root of the file system.
+    /// Absolute path.
     pub path: PathBuf,
-    /// Its size when the query was planned, checked where it is read; 0 for a folder, of which it is not.
+    /// Size when the query was planned, checked before reading; 0 for a folder, which is not checked.
     pub bytes: u64,
 }
 
-/// What is read of which recordings: plain data, which a plan carries to another machine.
+/// A scan of recordings: plain data that a plan carries to another machine.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Scan {
-    /// What is read.
+    /// Kind of the rows.
     pub kind: Kind,
     /// The recordings of each partition.
     pub partitions: Vec<Vec<Listed>>,
-    /// Recordings of the table that the query does not ask for.
+    /// Number of recordings of the table that the query does not need.
     pub skipped: usize,
-    /// What the query asks for.
+    /// Bound on the rows, from the filters of the query.
     pub asked: Asked,
-    /// The columns, by their place; `None` for all.
+    /// Indices of the projected columns; `None` for all.
     pub projection: Option<Vec<usize>>,
-    /// Rows of a partition after which no more are wanted.
+    /// Number of rows per partition after which reading stops.
     pub limit: Option<usize>,
 }
 
 impl Scan {
-    /// Those of all columns that are asked for.
+    /// Schema of the projected columns.
     ///
     /// # Errors
-    /// If there is no such column.
+    /// If a projected column does not exist.
     pub fn projected(&self, all: &SchemaRef) -> Result<SchemaRef> {
         Ok(match &self.projection {
             Some(columns) => Arc::new(all.project(columns)?),
@@ -69,20 +69,20 @@ impl Scan {
     }
 }
 
-/// What `EXPLAIN ANALYZE` counts.
+/// Counters of `EXPLAIN ANALYZE`.
 pub(crate) struct Counts {
     /// Recordings that were opened.
     pub(crate) opened: Count,
-    /// Chunks that were read and unpacked.
+    /// Chunks that were read and decompressed.
     pub(crate) chunks_read: Count,
-    /// Chunks of the opened recordings that were not.
+    /// Chunks of the opened recordings that were skipped.
     pub(crate) chunks_skipped: Count,
 }
 
-/// Opens a recording that is still what the plan names.
+/// Opens a recording, checking that it has not changed since the query was planned.
 ///
 /// # Errors
-/// If it cannot be opened, or has another size by now.
+/// If it cannot be opened, or its size has changed.
 pub(crate) fn open(listed: &Listed, counts: &Counts) -> Result<Recording> {
     let recording = tauscope_session::open(&listed.path).map_err(external)?;
     if listed.bytes != 0 && recording.bytes() != listed.bytes {
@@ -97,7 +97,7 @@ pub(crate) fn open(listed: &Listed, counts: &Counts) -> Result<Recording> {
     Ok(recording)
 }
 
-/// An error that `DataFusion` hands on.
+/// Wraps an error for `DataFusion`.
 pub(crate) fn external(
     error: impl Into<Box<dyn std::error::Error + Send + Sync>>,
 ) -> DataFusionError {

@@ -1,4 +1,4 @@
-//! What the paths of a query are: recordings, manifests of them, or results.
+//! Sources of a query, from its paths: recordings, manifests of them, or results.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use tauscope_pipeline::results::{Manifest, parquet_files};
 
 use crate::scan::Listed;
 
-/// What a query is about.
+/// Recordings and results of a query.
 #[derive(Debug, Default)]
 pub struct Sources {
     /// Recordings, each once.
@@ -20,11 +20,11 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// Sorts paths and patterns: a file that ends in `.parquet`, and a folder that holds some, is a result; one that ends
-    /// in `.jsonl` is a manifest; all else is a recording.
+    /// Sorts paths and patterns: a `.parquet` file, or a folder that contains some, is a result; a `.jsonl` file is a
+    /// manifest; everything else is a recording.
     ///
     /// # Errors
-    /// Each path at which there is nothing.
+    /// For each path that does not exist.
     pub fn of(paths: &[PathBuf]) -> Result<Self, Report> {
         let mut sources = Self::default();
         let mut report = Report::default();
@@ -83,7 +83,7 @@ impl Sources {
 /// The recordings of a pattern.
 ///
 /// # Errors
-/// If there is none, or one is no recording.
+/// If there is none, or a file is not a recording.
 pub fn recordings(pattern: &str) -> Result<Vec<Listed>, Report> {
     let sources = Sources::of(&[PathBuf::from(pattern)])?;
     if sources.recordings.is_empty() {
@@ -97,7 +97,7 @@ pub fn recordings(pattern: &str) -> Result<Vec<Listed>, Report> {
 
 fn listed(path: &Path) -> Result<Listed, Report> {
     let failed = |error: std::io::Error| Problem::of_file(path, error.to_string());
-    // An episode of a data set has no file of its name.
+    // An episode of a data set has no file of its own.
     let bytes = if path.is_dir() || !path.exists() {
         0
     } else {
@@ -109,12 +109,12 @@ fn listed(path: &Path) -> Result<Listed, Report> {
     })
 }
 
-/// Plans name files so that they can be found from any folder.
+/// Makes a path absolute, so that a plan does not depend on the working folder.
 fn absolute(path: &Path) -> Result<PathBuf, Report> {
     Ok(std::path::absolute(path).map_err(|error| Problem::of_file(path, error.to_string()))?)
 }
 
-/// The paths, those of a pattern in the order of their names.
+/// Expands the patterns; the matches of each are sorted by name.
 fn expand(paths: &[PathBuf], report: &mut Report) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for path in paths {

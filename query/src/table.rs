@@ -1,4 +1,4 @@
-//! The tables that are read from recordings.
+//! Tables that are read from recordings.
 
 use std::sync::Arc;
 
@@ -18,19 +18,19 @@ use crate::asked::Asked;
 use crate::exec::ArchiveExec;
 use crate::scan::{Kind, Listed, Scan};
 
-/// A table over recordings. It holds names alone.
+/// A table over recordings. It holds only their names.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ArchiveTable {
-    /// What is read.
+    /// Kind of the rows.
     pub kind: Kind,
-    /// From which recordings.
+    /// The recordings.
     pub recordings: Vec<Listed>,
 }
 
 /// Registers `recordings` and `joints`.
 ///
 /// # Errors
-/// If the session has such tables already.
+/// If the session already has such tables.
 pub fn register(context: &SessionContext, recordings: &[Listed]) -> Result<(), Report> {
     if recordings.is_empty() {
         return Ok(());
@@ -55,7 +55,7 @@ impl TableProvider for ArchiveTable {
         TableType::Base
     }
 
-    /// What is not wanted is not read; what is read beside it, `DataFusion` filters.
+    /// Filters reduce the data that is read; `DataFusion` applies them again to the rows.
     fn supports_filters_pushdown(
         &self,
         filters: &[&Expr],
@@ -67,7 +67,7 @@ impl TableProvider for ArchiveTable {
         Ok(filters.iter().map(of).collect())
     }
 
-    /// Each partition has its own list of recordings, fixed here: whoever executes a partition again reads the same.
+    /// Assigns a fixed list of recordings to each partition, so that repeating a partition reads the same files.
     async fn scan(
         &self,
         state: &dyn Session,
@@ -81,7 +81,7 @@ impl TableProvider for ArchiveTable {
         let count = wanted.len().min(state.config().target_partitions().max(1));
         let mut partitions = vec![Vec::new(); count];
         for (index, one) in wanted.iter().enumerate() {
-            // Neighbours go apart: recordings of one day are alike.
+            // Neighbours are distributed over the partitions, because recordings of one day are similar.
             partitions[index % count].push((*one).clone());
         }
         let scan = Scan {

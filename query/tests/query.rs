@@ -1,4 +1,4 @@
-//! What queries answer, beside what the crates that they rest on give.
+//! Tests of answers to queries, beyond those of the crates that the program builds on.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -48,14 +48,14 @@ fn rows(sql: &str, paths: &[&str]) -> Vec<Value> {
         .collect()
 }
 
-/// What is said of a wrong query.
+/// Error message of a wrong query.
 fn wrong(arguments: &[&str]) -> String {
     let answer = ask(arguments);
     assert_eq!(answer.status.code(), Some(2), "{arguments:?}");
     String::from_utf8(answer.stderr).unwrap()
 }
 
-/// What `tauscope replay --manifest` makes of the recordings that come with the repository.
+/// Results of `tauscope replay --manifest` for the recordings in the repository.
 fn results() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(root().join("pipeline.yaml")).unwrap();
@@ -177,7 +177,7 @@ fn only_the_chunks_of_the_time_and_the_topic_asked_for_are_read() {
     );
     let of_another = "select sum(effort) from joints where topic = '/other'";
     assert_eq!(chunks(of_another, path), (0, recording.chunks()));
-    // What is skipped changes no answer.
+    // Skipping chunks does not change the answer.
     let counted = rows(
         &format!("select count(*) n, sum(effort) s from joints where {within}"),
         &[path],

@@ -16,7 +16,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// An axis on which all finite `values` have room; `None` where there is none.
+    /// An axis over the range of all finite `values`; `None` if there are none.
     pub fn over(values: impl IntoIterator<Item = f64>, from_px: f64, to_px: f64) -> Option<Self> {
         let (low, high) = values
             .into_iter()
@@ -27,7 +27,7 @@ impl Axis {
         (low <= high).then(|| Self::between(low, high, from_px, to_px))
     }
 
-    /// An axis from `low` to `high`, widened if that is no range.
+    /// An axis from `low` to `high`, widened if the range is empty.
     pub fn between(low: f64, high: f64, from_px: f64, to_px: f64) -> Self {
         let enough = 1e-9 * low.abs().max(high.abs()).max(1e-3);
         let (low, high) = if high - low < enough {
@@ -44,7 +44,7 @@ impl Axis {
         }
     }
 
-    /// The same with some room at both ends.
+    /// Extends the axis by `share` of its range at both ends.
     #[must_use]
     pub fn padded(mut self, share: f64) -> Self {
         let room = share * (self.high - self.low);
@@ -53,18 +53,18 @@ impl Axis {
         self
     }
 
-    /// Where a value is, at most at the ends \[px\].
+    /// Position of a value, clamped to the ends \[px\].
     pub fn px(&self, value: f64) -> f64 {
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
         self.from_px + share * (self.to_px - self.from_px)
     }
 
-    /// Whether a value is on it.
+    /// Whether a value is within the axis.
     pub fn holds(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
 
-    /// Round values, about `count` of them, and their texts.
+    /// About `count` round values, with their labels.
     pub fn ticks(&self, count: usize) -> Vec<(f64, String)> {
         let rough = (self.high - self.low) / count.max(1) as f64;
         let decade = 10_f64.powf(rough.log10().floor());
@@ -92,14 +92,14 @@ impl Axis {
 /// A rectangle with values along both sides.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// Along the lower side.
+    /// Horizontal axis, along the lower side.
     pub x: Axis,
-    /// Along the left side.
+    /// Vertical axis, along the left side.
     pub y: Axis,
 }
 
 impl Panel {
-    /// Grid, ticks, and the axes' names; `x_name` is `None` where the panel below has it.
+    /// Grid, ticks and names of the axes; `x_name` is `None` if the panel below has it.
     pub fn frame(
         &self,
         x_ticks: usize,
@@ -132,10 +132,10 @@ impl Panel {
         }
     }
 
-    /// A line through the points; it breaks where one is not finite.
+    /// A line through the points, interrupted at points that are not finite.
     pub fn line(&self, class: &str, xs: &[f64], ys: &[f64]) -> Markup {
         let mut path = String::new();
-        // In tenths of a pixel, each from the one before: half as long as absolute floats.
+        // Relative coordinates in tenths of a pixel: half as long as absolute floats.
         let mut before: Option<(i64, i64)> = None;
         for (&x, &y) in xs.iter().zip(ys) {
             if !(x.is_finite() && y.is_finite()) {
@@ -153,7 +153,7 @@ impl Panel {
         html! { path class=(class) d=(path) {} }
     }
 
-    /// A dot a point.
+    /// A dot for each point.
     pub fn dots(&self, class: &str, points: impl IntoIterator<Item = (f64, f64)>) -> Markup {
         let mut path = String::new();
         for (x, y) in points {
@@ -174,7 +174,7 @@ impl Panel {
         }
     }
 
-    /// From one instant to another over the whole height.
+    /// A band between two instants over the whole height.
     pub fn span(&self, from: f64, to: f64) -> Markup {
         let (left, right) = (self.x.px(from), self.x.px(to));
         let (top, bottom) = (self.y.to_px, self.y.from_px);
@@ -184,7 +184,7 @@ impl Panel {
     }
 }
 
-/// A pixel to a tenth.
+/// A coordinate in pixels, rounded to a tenth.
 pub fn r(value: f64) -> String {
     px(tenths(value))
 }
@@ -202,8 +202,8 @@ fn px(tenths: i64) -> String {
     }
 }
 
-/// A range that leaves out the outermost `share` at both ends, so that a few wild points do not squeeze all
-/// others; `None` where nothing is finite.
+/// Range of the values without the outermost `share` at both ends, so that a few outliers do not compress the plot;
+/// `None` if no value is finite.
 pub fn bulk(values: impl IntoIterator<Item = f64>, share: f64) -> Option<[f64; 2]> {
     let mut values: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
     values.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! What effects are called, and what they mean at the arm.
+//! Names of effects in words, and their meaning for the arm.
 
 use tauscope_dynamics::terms;
 
@@ -12,13 +12,13 @@ pub(super) fn effect_title(effect: &str) -> String {
     title.map_or_else(|| sentence_case(effect), str::to_owned)
 }
 
-/// What an effect is, in a sentence; nothing for one that is not known.
+/// Meaning of an effect, in a sentence; `None` for an unlisted effect.
 pub(super) fn effect_meaning(effect: &str) -> Option<&'static str> {
     let of_effect = terms::effect(effect).map(|effect| effect.words.meaning);
     of_effect.or_else(|| slip_words::words(effect).map(|words| words.meaning))
 }
 
-/// An effect and where it is: `Coulomb friction of joint3`.
+/// An effect with its place: `Coulomb friction, joint3`.
 pub(super) fn effect_at(effect: &str, joint: Option<&str>, link: Option<&str>) -> String {
     let title = effect_title(effect);
     match place(joint, link) {
@@ -27,7 +27,7 @@ pub(super) fn effect_at(effect: &str, joint: Option<&str>, link: Option<&str>) -
     }
 }
 
-/// `joint3`, `link tool`; nothing for an effect of the whole arm.
+/// `joint3`, `link tool`; `None` for an effect of the whole arm.
 pub(super) fn place(joint: Option<&str>, link: Option<&str>) -> Option<String> {
     match (joint, link) {
         (Some(joint), _) if mentions(joint, "joint") => Some(joint.to_owned()),

@@ -1,4 +1,4 @@
-//! The findings, a card each.
+//! The findings, one card each.
 
 use maud::{Markup, html};
 use tauscope_dynamics::terms::UNKNOWN;
@@ -11,7 +11,7 @@ use super::proof;
 use tauscope_explain::report::error_left;
 use tauscope_explain::report::{Finding, Report, Verdict};
 
-/// A card a finding, or that there is none.
+/// One card for each finding, or a sentence that there is none.
 pub(super) fn cards(report: &Report) -> Option<Markup> {
     if report.verdict == Verdict::NotEvaluated && report.findings.is_empty() {
         return None;
@@ -21,7 +21,7 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
         @if report.findings.is_empty() {
             p {
                 @if report.verdict == Verdict::NothingMissing && !proof::rows(report).iter().any(proof::Row::is_left) {
-                    "Nothing. What is left between the twin and the recordings is noise, as far as this data shows."
+                    "Nothing. The residual between recordings and twin is noise, as far as this data shows."
                 } @else {
                     "Nothing was named."
                 }
@@ -29,7 +29,7 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
         }
         @if report.findings.len() > 1 {
             p.lead {
-                "By joint and link, that with the largest effort first."
+                "Findings by joint and link, the largest effort first."
                 @if let Some(units) = units(report) { " " (units) }
                 @if let Some(shares) = shares(report) { " " (shares) }
             }
@@ -46,19 +46,19 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
     })
 }
 
-/// Why some numbers are in N m and some in A.
+/// The reason why some parameters are in N m and some in A.
 fn units(report: &Report) -> Option<&'static str> {
     let in_amperes = report.findings.iter().filter(|f| f.in_amperes).count();
     let mixed = in_amperes > 0 && in_amperes < report.findings.len();
     mixed.then_some(
-        "Efforts are in A, as recorded. The numbers of a finding are in N m where these recordings tell how many N m \
-         an ampere is at that joint, else in A.",
+        "Efforts are in A, as recorded. The parameters of a finding are in N m if these recordings determine the torque \
+         constant of the joint, otherwise in A.",
     )
 }
 
-/// How the shares of the findings are to be read, where they do not add up to what the correction takes.
+/// A remark on the findings' shares if they do not add up to the reduction by the correction.
 fn shares(report: &Report) -> Option<Markup> {
-    /// Shares that come to this part of what went add up, as far as a reader sees.
+    /// Fraction of the reduction above which the shares are treated as adding up to it.
     /// Layout: by eye; no number depends on it.
     const MOST: f64 = 0.8;
     let left = error_left(&report.holdout_rms_before, &report.holdout_rms_after);
@@ -67,10 +67,10 @@ fn shares(report: &Report) -> Option<Markup> {
     let fitted = report.effort_unit == "A" && report.findings.iter().any(|f| !f.in_amperes);
     (alone < MOST * gone).then(|| {
         html! {
-            "The shares below do not add up to what the correction takes: if one finding is left out, the others are fitted "
-            "again and take over part of what it explained."
+            "The shares below do not add up to the reduction by the correction: if one finding is left out, the others are "
+            "fitted again and explain part of its share."
             @if fitted {
-                " So do the torque constants, which are no findings: see " a href="#notes" { "Notes" } "."
+                " So do the torque constants, which are not findings: see " a href="#notes" { "Notes" } "."
             }
         }
     })
@@ -94,7 +94,7 @@ fn card(finding: &Finding, effort_unit: &str) -> Markup {
             div.halves { div {
             p.sentence { (finding.sentence) }
             @if finding.is_without_law() {
-                p.meaning { "Nothing that was tried describes it, so the correction has nothing for it." }
+                p.meaning { "No law and no curve describes it, so the correction does not contain it." }
             } @else if let Some(meaning) = effect_meaning(finding.known_as()) {
                 p.meaning { (meaning) }
             }
@@ -116,7 +116,7 @@ fn card(finding: &Finding, effort_unit: &str) -> Markup {
             }
             @if !finding.equivalent_to.is_empty() {
                 p.rival {
-                    b { "Cannot be told apart from " }
+                    b { "Cannot be distinguished from " }
                     (list(finding.equivalent_to.iter().map(|rival| {
                         effect_at(&rival.effect, rival.joint.as_deref(), rival.link.as_deref())
                     })))
@@ -131,7 +131,7 @@ fn card(finding: &Finding, effort_unit: &str) -> Markup {
     }
 }
 
-/// Names with commas and an `or`, most probable first.
+/// Names in the given order, with semicolons and an `or`.
 pub(super) fn list(names: impl Iterator<Item = String>) -> String {
     let mut names: Vec<_> = names.collect();
     let last = names.pop().unwrap_or_default();
@@ -174,7 +174,7 @@ pub(super) fn meter(share: f64) -> Markup {
 }
 
 fn parameters(finding: &Finding) -> Markup {
-    // A mass says more than where it is, and when comes last.
+    // Masses first, times last.
     let rank = |name: &str| match name {
         "coulomb_after_nm" => 2,
         "t_start_s" | "change_time_session_s" => 3,
@@ -206,7 +206,7 @@ fn parameters(finding: &Finding) -> Markup {
     }
 }
 
-/// An angle in degrees as well.
+/// The value in degrees in addition, if it is an angle.
 fn degrees(value: Option<f64>, unit: &str) -> Markup {
     html! {
         @if let Some(angle) = value && unit == "rad" {
@@ -215,7 +215,7 @@ fn degrees(value: Option<f64>, unit: &str) -> Markup {
     }
 }
 
-/// The interval on an axis with zero: how far is it from nothing?
+/// The interval on an axis with zero, which shows its distance from no effect.
 fn interval_picture(value: Option<f64>, [low, high]: [f64; 2]) -> Markup {
     let all = [Some(0.0), value, Some(low), Some(high)];
     let axis = (low.is_finite() && high.is_finite())

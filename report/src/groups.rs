@@ -1,43 +1,43 @@
-//! Findings by the joint or link that they are in, that with the largest effort first.
+//! Findings grouped by joint or link, the group with the largest effort first.
 
 use super::effects::place;
 use tauscope_explain::report::{Finding, Report};
 
 /// The findings of a place.
 pub(super) struct Group<'a> {
-    /// The joint, if they are in one.
+    /// Joint of the findings, if they have one.
     pub joint: Option<&'a str>,
-    /// The link, if they are in one.
+    /// Link of the findings, if they have one and no joint.
     pub link: Option<&'a str>,
-    /// The largest first.
+    /// Findings, the largest effort first.
     pub findings: Vec<&'a Finding>,
-    /// Of the largest \[effort unit\].
+    /// Effort of the largest finding \[effort unit\].
     pub effort: f64,
 }
 
 impl Group<'_> {
-    /// What the place is called.
+    /// Name of the place.
     pub fn title(&self) -> String {
         place(self.joint, self.link).unwrap_or_else(|| "Whole arm".to_owned())
     }
 
-    /// Whether it is this joint.
+    /// Whether the group belongs to this joint.
     pub fn is_joint(&self, joint: &str) -> bool {
         self.joint == Some(joint)
     }
 }
 
-/// The findings, those of the place with the largest effort first, and in a place the largest first.
+/// The findings by place, the largest effort first, among places and within each.
 pub fn largest_first(report: &Report) -> impl Iterator<Item = &Finding> {
     of(report).into_iter().flat_map(|group| group.findings)
 }
 
-/// The findings by place; places and what is in them by effort.
+/// Groups the findings by place, and sorts groups and findings by effort.
 pub(super) fn of(report: &Report) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     for finding in &report.findings {
         let (joint, link) = (finding.joint.as_deref(), finding.link.as_deref());
-        // An unnamed body is told with the joint that carries it.
+        // An `unknown` body has joint and link; it is listed with its joint.
         let link = link.filter(|_| joint.is_none());
         let known = groups
             .iter_mut()

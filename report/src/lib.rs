@@ -1,10 +1,10 @@
 #![doc = include_str!("../README.md")]
 //!
-//! `report.html`: what was found as a page for whoever runs the cell. One file that needs nothing else: no script,
-//! no font, no picture from elsewhere; light or dark as the reader's screen is, and good on paper.
+//! `report.html`: the findings as a page for the person who runs the cell. The file is self-contained: no script, no
+//! external font or picture. It is light or dark like the reader's screen, and can be printed.
 //!
-//! Everything that comes from a file or a name is escaped by the template; the pictures are SVG in the page and take
-//! their colours from its style sheet (Okabe and Ito's, which the colour-blind can tell apart).
+//! The template escapes every text that comes from a file or a name. The pictures are inline SVG with the colours of
+//! the style sheet: the palette of Okabe and Ito, which colour-blind readers can distinguish.
 
 pub mod chart;
 mod effects;
@@ -30,45 +30,44 @@ use tauscope_explain::report::{RecordingPicture, Report, Verdict};
 use self::number_format::percent;
 use self::tone::Tone;
 
-/// The style sheet of our pages.
+/// The style sheet of the pages.
 pub const STYLE: &str = include_str!("style.css");
 
-/// Nothing may be loaded and nothing may run: also if a name in a file tries to.
+/// Content security policy: nothing may be loaded or executed, even if a name in a file contains markup.
 pub const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
 
-/// A verdict with more characters than this is set smaller.
+/// Number of characters above which the verdict is set in smaller type.
 /// Layout: by eye; no number depends on it.
 const LONG: usize = 130;
 
-/// What the page tells beside the report. Paths are as the reader would type them; what is not there is left out.
+/// Content of the page in addition to the report. Paths are as the reader would type them. Empty fields are omitted.
 #[derive(Debug, Clone, Default)]
 pub struct Around<'a> {
-    /// By what the report was made, of which files: stands at the foot as it is.
+    /// Program and input files of the report, by label; printed unchanged at the foot.
     pub provenance: BTreeMap<String, String>,
-    /// The day on which it was made.
+    /// Date of the report.
     pub date: String,
-    /// The robot, to be drawn.
+    /// Model of the robot, for the picture.
     pub model: Option<&'a Model>,
-    /// The URDF.
+    /// Path of the URDF.
     pub robot: Option<String>,
-    /// The corrected twin that was started from.
+    /// Path of the corrected twin that the explanation started from.
     pub start: Option<String>,
-    /// Recordings that were fitted.
+    /// Paths of the fitted recordings.
     pub fit: Vec<String>,
-    /// Recordings that were not.
+    /// Paths of the held-out recordings.
     pub holdout: Vec<String>,
-    /// The corrected twin, if one was written.
+    /// Path of the corrected twin, if one was written.
     pub twin: Option<String>,
-    /// The corrected robot, if one was written.
+    /// Path of the corrected robot, if one was written.
     pub corrected_robot: Option<String>,
 }
 
 pub use groups::largest_first;
 
-/// The page.
+/// Renders the page.
 ///
-/// `pictures` are the recordings to draw, none if there are none; the first stamp among them counts as the start of the
-/// session.
+/// `pictures` are the recordings to draw, possibly none. Their first stamp is treated as the start of the session.
 pub fn page(report: &Report, pictures: &[RecordingPicture], around: &Around<'_>) -> String {
     let robot = (around.model).and_then(|model| robot::picture(report, model, pictures));
     let sections: Vec<Section> = [
@@ -77,7 +76,7 @@ pub fn page(report: &Report, pictures: &[RecordingPicture], around: &Around<'_>)
             "What the twin leaves out",
             findings::cards(report),
         ),
-        Section::of("where", "Where the mismatch sits", proof::located(report)),
+        Section::of("where", "Where the mismatch is", proof::located(report)),
         Section::of("proof", "Before and after", proof::before_and_after(report)),
         Section::of(
             "pictures",
@@ -86,11 +85,7 @@ pub fn page(report: &Report, pictures: &[RecordingPicture], around: &Around<'_>)
         ),
         Section::of("rivals", "Rivals", rivals::rejected(report)),
         Section::of("next", "What to record next", rivals::next(report)),
-        Section::of(
-            "hidden",
-            "What could have hidden",
-            rivals::undetectable(report),
-        ),
+        Section::of("hidden", "Detection limits", rivals::undetectable(report)),
         Section::of("notes", "Notes", rivals::notes(report)),
     ]
     .into_iter()
@@ -181,11 +176,11 @@ fn header(report: &Report) -> Markup {
 struct Fact {
     number: String,
     text: String,
-    /// Whether it speaks for the verdict; else it does not have its colour.
+    /// Whether the number supports the verdict and so has its colour.
     is_good: bool,
 }
 
-/// What it comes to, in numbers.
+/// The key figures under the verdict.
 fn facts(report: &Report) -> Vec<Fact> {
     let fact = |number: String, text: &str, is_good| Fact {
         number,
@@ -207,7 +202,7 @@ fn facts(report: &Report) -> Vec<Fact> {
         facts.push(fact(count.to_string(), text, true));
         let left = error_left(&report.holdout_rms_before, &report.holdout_rms_after);
         if left.is_finite() && !proof::is_elsewhere(report) {
-            let text = "of the error (RMS) is left on held-out data, which was never fitted";
+            let text = "of the error (RMS) remains on held-out data, which was not fitted";
             facts.push(fact(percent(left), text, true));
         }
     }
@@ -236,11 +231,11 @@ fn footer(report: &Report, provenance: &BTreeMap<String, String>) -> Markup {
             details {
                 summary { "How to read this page" }
                 dl.words {
-                    dt { "Twin" } dd { "The model of the arm: from a motion it says which effort (" (unit) ") each joint should need." }
+                    dt { "Twin" } dd { "The model of the arm: it computes the effort (" (unit) ") that a motion requires of each joint." }
                     dt { "Mismatch, residual" } dd { "Measured effort minus the twin’s effort." }
                     dt { "Held-out" } dd { "Recordings, or parts of them, that no number on this page was fitted to. Errors on them show whether the correction predicts." }
                     dt { "RMS" } dd { "Root of the mean square of the residual over all samples as recorded, not filtered and not trimmed." }
-                    dt { "Noise" } dd { "RMS of the white noise in the measured effort, estimated from its fastest changes on the fitted recordings. It is an estimate: what changes from sample to sample and yet follows the motion counts as noise, too." }
+                    dt { "Noise" } dd { "RMS of the white noise in the measured effort, estimated from its fastest changes on the fitted recordings. It is an estimate: changes from sample to sample are treated as noise even if they follow the motion." }
                     dt { "95 % interval" } dd { "The true value lies in it in 95 of 100 cases like this one." }
                 }
             }

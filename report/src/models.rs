@@ -1,7 +1,7 @@
-//! Corrections in a simulator's own file.
+//! Export of corrections into a simulator's own file.
 //!
-//! A twin's terms become [`Corrections`]: quantities of joints and bodies. A [`Target`] says which of them its simulator has, by
-//! which element; writers change those places of the user's file and nothing else.
+//! A twin's terms become [`Corrections`]: quantities of joints and bodies. A [`Target`] maps each quantity to an
+//! element of its simulator, if there is one. The writers change these elements of the user's file and nothing else.
 
 mod corrections;
 mod edits;
@@ -11,7 +11,7 @@ mod sdf;
 mod table;
 mod target;
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#[allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 mod tests;
 mod urdf;
 
@@ -19,22 +19,22 @@ pub use corrections::{Corrections, JointCorrections};
 pub use table::table;
 pub use target::{Place, TARGETS, Target};
 
-/// Why a model cannot be written.
+/// The reason why a model cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
-    /// The file is no XML.
+    /// The file is not well-formed XML.
     #[error("the model is not well-formed XML: {0}")]
     Xml(#[from] roxmltree::Error),
-    /// The file is of another kind.
+    /// The file is of another kind than the target.
     #[error(
         "the model is a <{found}>, and {target} needs a <{expected}>: give the file with --model FILE"
     )]
     OtherKind {
-        /// The outermost element.
+        /// The outermost element of the file.
         found: String,
         /// The target's name.
         target: &'static str,
-        /// The outermost element that it needs.
+        /// The outermost element that the target needs.
         expected: &'static str,
     },
     /// The file lacks a joint or a link.
@@ -45,9 +45,9 @@ pub enum ModelError {
         /// Its name.
         name: String,
     },
-    /// A link would have a mass or inertia that no body has.
+    /// A link would get a mass or inertia that no rigid body has.
     #[error(
-        "{kind} `{name}` would get a mass or an inertia that no rigid body has: this data tells some of its numbers too badly"
+        "{kind} `{name}` would get a mass or an inertia that no rigid body has: some of its parameters are too uncertain in this data"
     )]
     NoBody {
         /// `link` or `body`.
@@ -68,10 +68,11 @@ pub struct Written {
     pub lost: Vec<String>,
 }
 
-/// The corrections in the file `source` of a simulator (empty for one that needs none). `urdf` is the robot as the twin reads it.
+/// Writes the corrections into the simulator's file `source` (empty for a target that needs none). `urdf` is the
+/// robot as the twin reads it.
 ///
 /// # Errors
-/// If the file is not one of that simulator, or lacks what is to be corrected.
+/// If the file is not one of that simulator, or lacks a joint or link to be corrected.
 pub fn write(
     target: Target,
     source: &str,

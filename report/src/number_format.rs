@@ -1,4 +1,4 @@
-//! Names of parameters, units and numbers in the words of whoever runs the cell.
+//! Names of parameters, units and numbers for the person who runs the cell.
 
 use serde_json::Value;
 use tauscope_dynamics::terms::words::unit;
@@ -15,7 +15,7 @@ pub(super) fn sentence_case(name: &str) -> String {
     }
 }
 
-/// Parameters whose names say too little by themselves.
+/// Labels of parameters whose names are not clear by themselves.
 const USUAL: [(&str, &str); 18] = [
     ("t_start", "Begins"),
     ("t_end", "Ends"),
@@ -26,15 +26,15 @@ const USUAL: [(&str, &str); 18] = [
     ("coulomb_after", "Friction after"),
     ("coulomb_start", "Friction at the start"),
     ("growth", "Change"),
-    ("gain_excess_start", "Too large at the start by"),
+    ("gain_excess_start", "Gain excess at the start"),
     ("share_of_effort", "Share of the effort"),
-    ("static", "Friction before it slips"),
+    ("static", "Static friction"),
     ("viscous", "Viscous friction"),
     ("viscous_warm", "Viscous friction, warm"),
-    ("viscous_extra_cold", "More of it when cold"),
+    ("viscous_extra_cold", "Additional viscous friction, cold"),
     ("change_time_session", "Changed at, in the session"),
     ("turning", "Turns over"),
-    ("release", "Lets go after"),
+    ("release", "Release time"),
 ];
 
 /// A parameter's name in words and its unit (empty for a pure number), from its canonical name.
@@ -50,7 +50,7 @@ pub(super) fn parameter(name: &str) -> (String, &'static str) {
     (parameter_label(&stem), unit)
 }
 
-/// The same, where it is known whether efforts are in A, and whether the joint slides.
+/// A parameter's name and unit at a joint: in A if `amperes`, for a prismatic joint if `slides`.
 pub(super) fn parameter_in(name: &str, amperes: bool, slides: bool) -> (String, String) {
     let (label, unit) = parameter(name);
     (label, in_units(unit, amperes, slides))
@@ -73,7 +73,7 @@ fn parameter_label(stem: &str) -> String {
             word => word.to_owned(),
         })
         .collect();
-    // `amplitude2` is that of the second wave.
+    // `amplitude2` is the amplitude of the second wave.
     if let Some(last) = words.last_mut()
         && let Some(stem) = last.strip_suffix('2')
         && stem.len() > 1
@@ -83,7 +83,7 @@ fn parameter_label(stem: &str) -> String {
     sentence_case(&words.join(" "))
 }
 
-/// A parameter's value; numbers with as many digits as their interval warrants.
+/// A parameter's value; a number has as many digits as its interval warrants.
 pub(super) fn value(value: &Value, interval: Option<[f64; 2]>) -> String {
     match (value, interval) {
         (Value::Number(number), interval) => {
@@ -112,7 +112,7 @@ pub(super) fn with_digits_of(number: f64, [low, high]: [f64; 2]) -> String {
     fixed(number, decimals.max(0) as usize)
 }
 
-/// A number with three digits that count; a dash for one that is none.
+/// A number with three significant digits; a dash if it is not finite.
 pub(super) fn number_text(number: f64) -> String {
     if !number.is_finite() {
         return "–".to_owned();
@@ -128,7 +128,7 @@ pub(super) fn number_text(number: f64) -> String {
     fixed(number, (2 - magnitude).max(0) as usize)
 }
 
-/// With a true minus sign, and none before a zero.
+/// A number with a true minus sign, and no sign if it rounds to zero.
 pub(super) fn fixed(number: f64, decimals: usize) -> String {
     let text = format!("{number:.decimals$}");
     match text.strip_prefix('-') {
@@ -155,7 +155,7 @@ fn superscript(exponent: i32) -> String {
         .collect()
 }
 
-/// A share as a percentage; a dash for one that is no number.
+/// A fraction as a percentage; a dash if it is not finite.
 pub(super) fn percent(share: f64) -> String {
     if !share.is_finite() {
         return "–".to_owned();
@@ -168,7 +168,7 @@ pub(super) fn percent(share: f64) -> String {
     }
 }
 
-/// How sure, or how much is gone: never 100 %.
+/// A confidence or a reduction as a percentage, never 100 %.
 pub(super) fn almost_all(share: f64) -> String {
     if share > 0.99 {
         "> 99 %".to_owned()

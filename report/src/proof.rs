@@ -1,4 +1,4 @@
-//! Where the mismatch sits, and what is left of it after the correction.
+//! Location of the mismatch, and the residual after the correction.
 
 use maud::{Markup, html};
 use tauscope_dynamics::terms::words::counted;
@@ -7,23 +7,23 @@ use super::chart::r;
 use super::number_format::{fixed, number_text, percent};
 use tauscope_explain::report::{Located, Report, Verdict};
 
-/// How many rows of a table are shown at once.
+/// Number of table rows that are shown unfolded.
 /// Layout: by eye; no number depends on it.
 const ROWS: usize = 6;
 
-/// A joint with an error below this many times its noise is at the noise floor.
+/// Ratio of error to noise below which a joint is at the noise floor.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const QUIET: f64 = 1.3;
 
-/// A joint with an error above this many times its noise still has a mismatch.
+/// Ratio of error to noise above which a joint still has a mismatch.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEFT: f64 = 3.0;
 
-/// A joint at less than this many times its noise shows that the estimate is too high.
+/// Ratio of error to noise below which the estimate of the noise is too high.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const BELOW: f64 = 0.95;
 
-/// A joint's errors on held-out data \[effort unit\]; what is not known is not a number.
+/// A joint's errors on held-out data \[effort unit\]; NaN if unknown.
 #[derive(Debug, Clone)]
 pub(super) struct Row<'a> {
     pub joint: &'a str,
@@ -42,27 +42,27 @@ impl Row<'_> {
         }
     }
 
-    /// Whether nothing but noise is left.
+    /// Whether the error after the correction is at the noise floor.
     pub fn is_quiet(&self) -> bool {
         self.over_noise() <= QUIET
     }
 
-    /// Whether less than the estimated noise is left, by so much that it must be said.
+    /// Whether the error after the correction is clearly below the estimated noise.
     pub fn is_below(&self) -> bool {
         self.over_noise() < BELOW
     }
 
-    /// Whether more than noise is left, by so much that it must be said.
+    /// Whether the error after the correction is clearly above the noise.
     pub fn is_left(&self) -> bool {
         self.over_noise() > LEFT
     }
 
-    /// Whether the correction made a difference that is worth a picture.
+    /// Whether the correction reduced the error enough for an unfolded picture.
     pub fn is_changed(&self) -> bool {
         self.before > 1.15 * self.after
     }
 
-    /// What weighs the joint among others: its own noise, or nothing.
+    /// Weight of the joint's squared error: the inverse noise variance, or 1 if the noise is unknown.
     fn weight(&self) -> f64 {
         if self.noise > 0.0 {
             self.noise.powi(-2)
@@ -71,7 +71,7 @@ impl Row<'_> {
         }
     }
 
-    /// What was gained, in squared units of noise.
+    /// Reduction of the squared error, in units of the noise variance.
     pub fn gain(&self) -> f64 {
         let gain = (self.before.powi(2) - self.after.powi(2)) * self.weight();
         if gain.is_finite() {
@@ -82,7 +82,7 @@ impl Row<'_> {
     }
 }
 
-/// The joints with their errors.
+/// The errors of all joints.
 pub(super) fn rows(report: &Report) -> Vec<Row<'_>> {
     let at = |values: &[f64], j: usize| values.get(j).copied().unwrap_or(f64::NAN);
     let row = |(j, joint)| Row {
@@ -100,7 +100,7 @@ pub(super) fn rows(report: &Report) -> Vec<Row<'_>> {
         .collect()
 }
 
-/// Whether all that was found happened in recordings that were fitted, so that held-out data cannot show it.
+/// Whether all findings belong to fitted recordings, so that held-out data cannot show them.
 pub(super) fn is_elsewhere(report: &Report) -> bool {
     !report.findings.is_empty()
         && report.findings.iter().all(|finding| {
@@ -109,14 +109,14 @@ pub(super) fn is_elsewhere(report: &Report) -> bool {
         })
 }
 
-/// Where, as a table with heat.
+/// Location of the mismatch, as a table with a heat column.
 pub(super) fn located(report: &Report) -> Option<Markup> {
     if report.located.is_empty() {
         return None;
     }
     let (first, rest) = report.located.split_at(report.located.len().min(ROWS));
     Some(html! {
-        p.lead { "Before any name was tried: in which joint, state or time the residual is largest. “Share” is the part of that joint’s squared residual that lies there." }
+        p.lead { "Joints, states and times with the largest residual, before any effect was considered. “Share” is the fraction of the joint’s squared residual there." }
         (heat(first))
         @if !rest.is_empty() {
             details {
@@ -162,7 +162,7 @@ fn share_bar(share: f64) -> Markup {
     }
 }
 
-/// Nothing at the noise, all at fifty times the noise.
+/// Heat of a cell in percent: 0 at the noise, 70 at fifty times the noise.
 fn heat_percent(over_noise: f64) -> i64 {
     if over_noise > 1.0 {
         (over_noise.ln() / 50_f64.ln() * 70.0).min(70.0) as i64
@@ -171,7 +171,7 @@ fn heat_percent(over_noise: f64) -> i64 {
     }
 }
 
-/// `1.3 ×`.
+/// A ratio as text, such as `1.3 ×`.
 fn times(ratio: f64) -> String {
     if ratio < 9.95 {
         format!("{} ×", fixed(ratio, 1))
@@ -205,20 +205,20 @@ pub(super) fn before_and_after(report: &Report) -> Option<Markup> {
             "RMS of measured minus expected effort on held-out data, in " (unit)
             ": not filtered, not trimmed. Nothing was fitted on it."
             @if is_elsewhere(report) {
-                " What was found happened in other recordings and does not recur here, so little changes; see below, joint by joint."
+                " The findings belong to other recordings and do not recur here, so little changes; see the plots of each joint."
             }
             @if report.findings.is_empty() { " Nothing was corrected, so both are the same." }
         }
         @if !left.is_empty() {
             p.rival {
-                b { "More than noise is left: " }
+                b { "Residual above the noise: " }
                 (left.join(", ")) "."
             }
         }
         @if !below.is_empty() {
             p.muted {
-                "Below the estimated noise: " (below.join(", ")) ". The estimate counts as noise whatever changes from sample to sample; "
-                "here a part of that follows the motion, or the held-out recordings are quieter than the fitted ones."
+                "Below the estimated noise: " (below.join(", ")) ". The estimate treats all changes from sample to sample as noise; "
+                "here part of them follows the motion, or the held-out recordings have less noise than the fitted ones."
             }
         }
         p.legend {
@@ -260,8 +260,8 @@ fn change(row: &Row<'_>) -> String {
     }
 }
 
-/// Two bars a joint. Where the joints are of very different strength each is drawn to its own scale, else the small
-/// ones could not be seen.
+/// Two bars for each joint. If the joints' efforts differ widely, each joint has its own scale, because small bars
+/// would be invisible on a common one.
 fn bars(rows: &[Row<'_>], unit: &str) -> Markup {
     let largest = |row: &Row<'_>| {
         [row.before, row.after, row.noise]
@@ -282,7 +282,7 @@ fn bars(rows: &[Row<'_>], unit: &str) -> Markup {
         };
         format!("--w:{}%", r(100.0 * share))
     };
-    // Beyond the mark of the noise, where that is beyond the bar.
+    // The number is placed behind the noise mark if that is longer than the bar.
     let beside = |value: f64, noise: f64, scale: f64| {
         let beyond = if scale > 0.0 {
             (noise - value) / scale

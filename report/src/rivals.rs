@@ -1,4 +1,4 @@
-//! What was not named and why, what to record next, what could have hidden, and notes.
+//! Rejected rivals with their reasons, motions to record next, detection limits, and notes.
 
 use std::collections::BTreeSet;
 
@@ -10,11 +10,11 @@ use super::number_format::{number_text, parameter_in};
 use super::proof;
 use tauscope_explain::report::{NextMotion, Rejected, Report, Undetectable, Verdict};
 
-/// How many rejected rivals the line names.
+/// Number of rejected rivals in the summary line.
 /// Layout: by eye; no number depends on it.
 const NAMES: usize = 4;
 
-/// The rivals that were considered in one line; what spoke against each is folded away.
+/// The rejected rivals in one line, with the reasons in a folded table.
 pub(super) fn rejected(report: &Report) -> Option<Markup> {
     if report.rejected.is_empty() {
         return None;
@@ -26,9 +26,9 @@ pub(super) fn rejected(report: &Report) -> Option<Markup> {
     Some(html! {
         details {
             summary {
-                "Tried, and not named: " (first.join("; "))
+                "Considered but not named: " (first.join("; "))
                 @if more > 0 { "; and " (more) " more" }
-                " (why not?)"
+                " (reasons)"
             }
             (rejected_table(&report.rejected))
         }
@@ -56,7 +56,7 @@ fn place_or_all(joint: Option<&str>, link: Option<&str>) -> String {
     place(joint, link).unwrap_or_else(|| "whole arm".to_owned())
 }
 
-/// What to record next; also that nothing need be.
+/// Motions to record next, or that none is needed.
 pub(super) fn next(report: &Report) -> Option<Markup> {
     if report.next_motions.is_empty() {
         let undecided = report.findings.iter().any(|f| !f.equivalent_to.is_empty());
@@ -65,10 +65,10 @@ pub(super) fn next(report: &Report) -> Option<Markup> {
         }
         let text = match report.verdict {
             Verdict::Explained if !undecided => {
-                "Nothing more is needed to name what was found: no rival is left that this data could not tell apart."
+                "Nothing more is needed to name the findings: this data distinguishes them from every rival considered."
             }
             Verdict::NothingMissing => {
-                "Nothing is needed. To look for weaker effects, record longer, faster and with a load: see below what could have hidden."
+                "Nothing is needed. To find weaker effects than the detection limits below, record longer, faster and with a load."
             }
             _ => return None,
         };
@@ -108,14 +108,14 @@ pub(super) fn trajectory(motion: &NextMotion) -> Markup {
     }
 }
 
-/// Whether a name is a file beside the page and nothing else that a link could mean.
+/// Whether a name is a relative path to a file, and nothing else that a link could mean.
 fn is_plain_name(name: &str) -> bool {
     let plain =
         |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'_' | b'-' | b'/');
     !name.is_empty() && !name.starts_with('/') && name.bytes().all(plain)
 }
 
-/// The smallest effects that would have been found: a row an effect, a column a joint.
+/// The smallest effects that would have been found: one row for each effect, one column for each joint.
 pub(super) fn undetectable(report: &Report) -> Option<Markup> {
     if report.undetectable.is_empty() {
         return None;
@@ -127,7 +127,7 @@ pub(super) fn undetectable(report: &Report) -> Option<Markup> {
             .is_some_and(|joint| report.joints.contains(joint))
     });
     Some(html! {
-        p.lead { "The smallest effect that this data would have shown. What is smaller could be there unseen." }
+        p.lead { "The smallest effect that this data would have shown. Smaller effects may be present." }
         details {
             summary { "Show the limits by effect" }
             @if !of_joints.is_empty() { (matrix(report, &of_joints)) }
@@ -200,7 +200,7 @@ fn others_table(hidden: &[&Undetectable]) -> Markup {
     }
 }
 
-/// What else a reader should know.
+/// Notes of the report.
 pub(super) fn notes(report: &Report) -> Option<Markup> {
     (!report.notes.is_empty()).then(|| {
         html! { ul.notes { @for note in &report.notes { li { (note) } } } }

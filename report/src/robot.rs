@@ -1,4 +1,4 @@
-//! The robot as a picture: its chain of joints in the pose that the recordings stay about, coloured by what was found.
+//! A picture of the robot: its joints in the mean recorded pose, coloured by their findings.
 
 use maud::{Markup, html};
 use tauscope_dynamics::terms::UNKNOWN;
@@ -10,40 +10,40 @@ use super::groups::{self, Group};
 use super::number_format::number_text;
 use tauscope_explain::report::{RecordingPicture, Report};
 
-/// The picture's width and height \[px\].
+/// Width and height of the picture \[px\].
 /// Layout: by eye; no number depends on it.
 const SIZE: [f64; 2] = [460.0, 330.0];
-/// The part of it that the arm has \[px\].
+/// Width and height of the part with the arm \[px\].
 /// Layout: by eye; no number depends on it.
 const ARM: [f64; 2] = [210.0, 280.0];
-/// Room around the arm \[px\].
+/// Margin around the arm \[px\].
 /// Layout: by eye; no number depends on it.
 const MARGIN: f64 = 24.0;
 /// Radius of a joint's disc \[px\].
 /// Layout: by eye; no number depends on it.
 const DISC: f64 = 9.0;
-/// The least distance of two discs \[px\].
+/// Smallest distance of two discs \[px\].
 /// Layout: by eye; no number depends on it.
 const APART: f64 = 21.0;
-/// How far from above the arm is looked at \[rad\].
+/// Elevation of the viewpoint \[rad\].
 /// Layout: by eye; no number depends on it.
 const ELEVATION: f64 = 0.25;
-/// How many places get a label.
+/// Number of labelled places.
 /// Layout: by eye; no number depends on it.
 const LABELS: usize = 6;
 
-/// A point of the picture \[px\].
+/// A point in the picture \[px\].
 type Point = [f64; 2];
 
 /// The arm in the plane of the picture.
 struct Drawing {
-    /// By link.
+    /// Origins of the links.
     links: Vec<Point>,
-    /// By joint.
+    /// Centres of the joints' discs.
     joints: Vec<Point>,
 }
 
-/// The robot, with a label for each place of a finding; `None` where nothing can be drawn.
+/// The robot with a label for each place of a finding; `None` if it cannot be drawn.
 pub(super) fn picture(
     report: &Report,
     model: &Model,
@@ -64,7 +64,7 @@ pub(super) fn picture(
     let pitch = (SIZE[1] - 40.0) / labels.len().max(1) as f64;
     Some(html! {
         figure.robot {
-            svg viewBox={ "0 0 " (SIZE[0]) " " (SIZE[1]) } role="img" aria-label="the robot, its joints coloured by what was found" {
+            svg viewBox={ "0 0 " (SIZE[0]) " " (SIZE[1]) } role="img" aria-label="the robot, its joints coloured by their findings" {
                 @for (child, link) in model.links().iter().enumerate() {
                     @if let Some(parent) = link.parent {
                         (segment(drawing.links[parent], drawing.links[child]))
@@ -84,12 +84,12 @@ pub(super) fn picture(
                     (disc(*at, joint, &report.joints[joint], group, largest))
                 }
             }
-            figcaption { "Joints by number from the base; a disc is the fuller the more effort what was found there needs. Squares are links." }
+            figcaption { "Joints are numbered from the base. A fuller disc means that the findings at this joint need more effort. Squares are links." }
         }
     })
 }
 
-/// Where the joints were on average; without recordings in the middle of their ranges.
+/// Mean recorded joint positions; without recordings the middle of the joints' ranges.
 fn pose(model: &Model, pictures: &[RecordingPicture]) -> Vec<f64> {
     let mean = |values: &[f64]| {
         let finite = values.iter().filter(|value| value.is_finite());
@@ -129,7 +129,7 @@ impl Drawing {
         Some(Self { links, joints })
     }
 
-    /// Where a group's findings are: at their joint, or half along their link.
+    /// Position of a group's mark: at its joint, or halfway along its link.
     fn place(&self, model: &Model, group: &Group<'_>) -> Option<Point> {
         if let Some(joint) = group.joint {
             return self.joints.get(model.joint_index(joint)?).copied();
@@ -140,13 +140,13 @@ impl Drawing {
         let child = (0..model.links().len()).find(is_child);
         Some(match child.map(|child| self.links[child]) {
             Some(end) => [f64::midpoint(own[0], end[0]), f64::midpoint(own[1], end[1])],
-            // At the end of the arm a little beyond the last disc.
+            // At the end of the arm, slightly beyond the last disc.
             None => [own[0] + 12.0, own[1] - 12.0],
         })
     }
 }
 
-/// Along the direction in which the arm is widest, from a little above.
+/// Projects points onto a plane along the arm's widest horizontal direction, seen from slightly above.
 fn seen_from_the_side(points: &[[f64; 3]]) -> Vec<Point> {
     let count = points.len().max(1) as f64;
     let mean = |axis: usize| points.iter().map(|p| p[axis]).sum::<f64>() / count;
@@ -161,13 +161,13 @@ fn seen_from_the_side(points: &[[f64; 3]]) -> Vec<Point> {
     let (sin, cos) = wide.sin_cos();
     let project = |[x, y, z]: &[f64; 3]| {
         let (across, away) = (cos * x + sin * y, cos * y - sin * x);
-        // Downwards, as pixels count.
+        // Pixels count downwards.
         [across, -(ELEVATION.cos() * z + ELEVATION.sin() * away)]
     };
     points.iter().map(project).collect()
 }
 
-/// Scaled and moved into the arm's part of the picture.
+/// Scales and moves the points into the part of the picture with the arm.
 fn fitted(points: &[Point]) -> Option<Vec<Point>> {
     let range = |axis: usize| {
         let values = points.iter().map(|p| p[axis]);
@@ -194,9 +194,9 @@ fn fitted(points: &[Point]) -> Option<Vec<Point>> {
     Some(points.iter().map(place).collect())
 }
 
-/// Moves discs apart that would cover each other, e.g. those of a wrist.
+/// Moves overlapping discs apart, such as those of a wrist.
 fn spread(points: &mut [Point]) {
-    /// Resolution: more rounds move no disc by a pixel.
+    /// Number of relaxation rounds. Resolution: more rounds move no disc by a pixel.
     const ROUNDS: usize = 60;
     for _ in 0..ROUNDS {
         for a in 0..points.len() {
@@ -206,7 +206,7 @@ fn spread(points: &mut [Point]) {
                 if distance >= APART {
                     continue;
                 }
-                // Those at one point go upwards, the further out the higher.
+                // Coinciding discs are spread upwards, the outer joint higher.
                 let [dx, dy] = if distance > 1e-6 {
                     apart.map(|d| d / distance)
                 } else {
@@ -250,7 +250,7 @@ fn disc(at: Point, joint: usize, name: &str, group: Option<&Group<'_>>, largest:
     }
 }
 
-/// How full a mark is: all at the largest effort, never less than a third.
+/// Fill of a mark: full at the largest effort, never less than a third.
 fn heat(group: &Group<'_>, largest: f64) -> String {
     let share = if largest > 0.0 && group.effort.is_finite() {
         (group.effort / largest).clamp(0.0, 1.0)
@@ -261,7 +261,7 @@ fn heat(group: &Group<'_>, largest: f64) -> String {
 }
 
 fn label(group: &Group<'_>, y: f64, unit: &str) -> Markup {
-    /// Longest text that is shown whole.
+    /// Number of characters above which a label is cut.
     /// Layout: by eye; no number depends on it.
     const LETTERS: usize = 27;
     let x = r(ARM[0] + 2.0 * MARGIN + 8.0);

@@ -152,7 +152,7 @@ fn all_that_was_found_is_on_the_page() {
         "N m",
         "3.90 to 4.30",
         "Torque gain, joint2",
-        "Cannot be told apart",
+        "Cannot be distinguished",
         "at reversals",
         "12 × noise",
         "Why it was not.",

@@ -1,4 +1,4 @@
-//! What to do now: which file to load, what to look at, what to record next; and what the page was made from.
+//! Next steps: file to load, parts to inspect, motion to record; and the inputs of the report.
 
 use maud::{Markup, html};
 use tauscope_dynamics::terms::UNKNOWN;
@@ -14,11 +14,11 @@ use tauscope_explain::report::look_at as part;
 use tauscope_explain::report::{Finding, NextMotion, Report, Rival, Verdict};
 use tauscope_explain::report::{UNCHANGED, error_left};
 
-/// How many parts a mechanic is sent to.
+/// Number of parts that are listed for inspection.
 /// Layout: by eye; no number depends on it.
 const PARTS: usize = 4;
 
-/// The box.
+/// The box with the next steps.
 pub(super) fn todo(report: &Report, around: &Around<'_>, robot: Option<Markup>) -> Markup {
     html! {
         section.todo id="now" {
@@ -36,12 +36,12 @@ pub(super) fn todo(report: &Report, around: &Around<'_>, robot: Option<Markup>) 
     }
 }
 
-/// Whether it is part of a corrected twin: it did not come and go.
+/// Whether a finding is part of the corrected twin, because it lasts to the end.
 fn lasts(finding: &Finding) -> bool {
     finding.t_end.is_none()
 }
 
-/// The file for the pipeline, or why there is none.
+/// The file to load in the pipeline, or the reason why there is none.
 fn load(report: &Report, around: &Around<'_>) -> Markup {
     let Some(twin) = around
         .twin
@@ -51,7 +51,7 @@ fn load(report: &Report, around: &Around<'_>) -> Markup {
         return html! {
             p {
                 @if report.is_of_mended() {
-                    "Nothing yet. The recordings, or what is said of them, must be mended first; then explain them again."
+                    "Nothing yet. Correct the recordings or their description first, then run explain again."
                 } @else { "Nothing. There is no corrected twin without a verdict." }
             }
         };
@@ -81,14 +81,14 @@ fn load(report: &Report, around: &Around<'_>) -> Markup {
     html! {
         p {
             @if report.findings.is_empty() { "The twin can stay as it is. " }
-            @else { "What was found came and went, so the twin’s physics can stay as it is. " }
+            @else { "The findings are temporary, so the twin’s physics can stay as it is. " }
             "This file adds the noise and the scores that detectors need for their thresholds:"
         }
         (in_pipeline)
     }
 }
 
-/// A path as it stands in a pipeline file, in quotes where YAML would take it for more than a text.
+/// A path as a YAML string, quoted if it has characters that are special in YAML.
 fn yaml(path: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "/._-+@".contains(c);
     if path.chars().all(plain) {
@@ -98,14 +98,14 @@ fn yaml(path: &str) -> String {
     }
 }
 
-/// What a mechanic looks at, the largest effort first.
+/// Parts of the arm to inspect, the largest effort first.
 fn look_at(report: &Report) -> Markup {
     let groups = groups::of(report);
     let all: Vec<&Finding> = groups
         .iter()
         .flat_map(|group| group.findings.iter().copied())
         .collect();
-    // Of each place the largest.
+    // The largest finding of each place.
     let of_group = |group: &Group<'_>| {
         let mut findings = group.findings.iter().filter(|f| !may_be_nothing(f));
         findings.find_map(|finding| {
@@ -121,7 +121,7 @@ fn look_at(report: &Report) -> Markup {
         return html! {
             p {
                 @if all.is_empty() { "Nothing: no effect was found." }
-                @else { "Nothing: what was found is part of such an arm, and no fault." }
+                @else { "Nothing: the findings are normal for such an arm, not faults." }
             }
         };
     }
@@ -138,7 +138,7 @@ fn look_at(report: &Report) -> Markup {
     }
 }
 
-/// Whether each of its sizes may as well be zero: nobody is sent to the arm for that. Times are no sizes.
+/// Whether the intervals of all sizes include zero: such a finding needs no inspection. Times are not sizes.
 fn may_be_nothing(finding: &Finding) -> bool {
     let of = |name: &str, [low, high]: [f64; 2]| {
         let is_change = name.contains("extra") || name.contains("delta");
@@ -146,7 +146,7 @@ fn may_be_nothing(finding: &Finding) -> bool {
     };
     let sizes = finding.intervals_95.iter();
     let sizes: Vec<(bool, bool)> = sizes.filter_map(|(name, i)| of(name, *i)).collect();
-    // Where there is a change, it is what was found, and not what it is a change of.
+    // If a finding has parameters of a change, only these count, not the baseline that changed.
     let changes = sizes.iter().any(|(is_change, _)| *is_change);
     let mut found = sizes
         .iter()
@@ -155,7 +155,7 @@ fn may_be_nothing(finding: &Finding) -> bool {
     found.peek().is_some() && found.all(|(_, may_be_zero)| *may_be_zero)
 }
 
-/// The motion that would tell more, or that none is needed.
+/// The most informative motion to record, or that none is needed.
 fn record(report: &Report) -> Markup {
     if let Some(first) = most_wanted(report) {
         return html! {
@@ -171,7 +171,7 @@ fn record(report: &Report) -> Markup {
         .collect();
     let text = match report.verdict {
         Verdict::NotEvaluated => {
-            "The same motion again, after what is said above is mended.".to_owned()
+            "Repeat the same motion after the cause given above is corrected.".to_owned()
         }
         Verdict::UnknownRemains => {
             let unknown = (report.findings.iter()).filter(|f| f.known_as() == UNKNOWN.name);
@@ -193,12 +193,12 @@ fn record(report: &Report) -> Markup {
             )
         }
         _ if !left.is_empty() => format!(
-            "More than noise is left at {}: move {} over the whole range, slowly and fast, in both directions.",
+            "The residual exceeds the noise at {}: move {} over the whole range, slowly and fast, in both directions.",
             left.join(", "),
             if left.len() == 1 { "it" } else { "them" }
         ),
         _ if (report.findings.iter()).any(|finding| !finding.equivalent_to.is_empty()) => {
-            "No motion is known that would tell apart what these recordings leave open: the findings below name their rivals."
+            "No known motion would distinguish the rivals that remain; the findings below list these rivals."
                 .to_owned()
         }
         _ => "Nothing more is needed.".to_owned(),
@@ -206,7 +206,7 @@ fn record(report: &Report) -> Markup {
     html! { p { (text) } }
 }
 
-/// The motion for the finding with the largest effort of those that have one.
+/// The motion of the finding with the largest effort among those that have a motion.
 fn most_wanted(report: &Report) -> Option<&NextMotion> {
     let groups = groups::of(report);
     let findings = groups.iter().flat_map(|group| group.findings.iter());
@@ -224,7 +224,7 @@ fn most_wanted(report: &Report) -> Option<&NextMotion> {
     report.next_motions.iter().min_by_key(place)
 }
 
-/// When, and from what.
+/// Date and inputs of the report.
 fn made_from(around: &Around<'_>) -> Markup {
     let list = |paths: &[String]| -> Markup {
         html! {

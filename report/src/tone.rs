@@ -1,4 +1,4 @@
-//! The verdict's colour, sign and words: the colour follows the share of the error that has no name.
+//! Colour, sign and text of the verdict. The colour follows the unexplained share of the error.
 
 use tauscope_dynamics::terms::UNKNOWN;
 
@@ -7,20 +7,20 @@ use super::proof::rows;
 use super::verdict_text;
 use tauscope_explain::report::{Report, Verdict};
 
-/// Below this share of the error (RMS) what is unknown is as good as nothing.
+/// Unexplained share of the error (RMS) below which it is negligible.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const HARDLY: f64 = 0.1;
-/// Below this share of the error (RMS) it is little.
+/// Unexplained share of the error (RMS) below which it is small.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LITTLE: f64 = 0.3;
 
-/// How a verdict looks: it must not hang on colour alone.
+/// Appearance of a verdict, which does not depend on colour alone.
 pub(super) struct Tone {
-    /// Of the style sheet.
+    /// Class in the style sheet.
     pub class: &'static str,
-    /// Before the words.
+    /// Sign before the text.
     pub sign: &'static str,
-    /// What the badge says.
+    /// Text of the badge.
     pub text: String,
 }
 
@@ -30,7 +30,7 @@ impl Tone {
             Verdict::Explained => ("explained", "✓"),
             Verdict::NothingMissing => ("nothing", "✓"),
             Verdict::NotEvaluated => ("none", "–"),
-            // A clear remainder at one joint is not averaged away by what is explained at others.
+            // A clear residual at one joint is not averaged away by explained joints.
             Verdict::UnknownRemains if !report.remaining.is_empty() || report.is_of_mended() => {
                 ("remains", "?")
             }
@@ -48,7 +48,7 @@ impl Tone {
         } else {
             "remains"
         };
-        // The badge begins as the title of the page does, and measures as every other error on it.
+        // The badge begins like the title of the page, and its share is an RMS like every error on it.
         let verdict = verdict_text(Verdict::UnknownRemains);
         let text = if share.is_finite() {
             format!("{verdict}: {} of the error (RMS)", percent(share))
@@ -60,8 +60,8 @@ impl Tone {
     }
 }
 
-/// Share of the error (RMS) that has no name: what a curve without a name describes, and what is left on held-out data
-/// beyond the noise. Not a number where neither is known.
+/// Unexplained share of the error (RMS): the part that `unknown` curves describe, and the residual on held-out data
+/// beyond the noise. NaN if neither is known.
 fn unknown_share(report: &Report) -> f64 {
     let known = rows(report).into_iter();
     let known = known.filter(|row| row.before.is_finite() && row.after.is_finite());

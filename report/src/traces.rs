@@ -1,4 +1,4 @@
-//! The joints one by one: effort over time, and the residual against what could have caused it.
+//! Plots of each joint: effort over time, and residual over velocity, position and load.
 
 use maud::{Markup, html};
 
@@ -7,20 +7,20 @@ use super::effects::effect_title;
 use super::proof::{Row, rows};
 use tauscope_explain::report::{Finding, JointPicture, RecordingPicture, Report};
 
-/// How many joints are shown without a click.
+/// Number of joints that are shown unfolded.
 /// Layout: by eye; no number depends on it.
 const OPEN: usize = 5;
-/// How many dots a scatter shows of each kind.
+/// Largest number of dots of each kind in a scatter plot.
 /// Layout: by eye; no number depends on it.
 const DOTS: usize = 900;
-/// Share of the dots at each end that may lie outside the axis of a scatter.
+/// Fraction of the dots that may lie outside the axis of a scatter plot, at each end.
 /// Layout: by eye; no number depends on it.
 const WILD: f64 = 0.004;
-/// Left and right end of the plots over time \[px\].
+/// Left and right ends of the plots over time \[px\].
 /// Layout: by eye; no number depends on it.
 const TIME_PX: [f64; 2] = [66.0, 950.0];
 
-/// All joints: those with findings or a large change first, the others folded away.
+/// All joints: first those with findings or a large change, then the others, folded.
 pub(super) fn joints(report: &Report, pictures: &[RecordingPicture]) -> Option<Markup> {
     let rows = rows(report);
     let mut order: Vec<&Row<'_>> = rows
@@ -99,7 +99,7 @@ fn joint(report: &Report, pictures: &[RecordingPicture], row: &Row<'_>, in_full:
     }
 }
 
-/// Which recordings are drawn: the held-out one with the largest gain, and one in which something happened.
+/// The recordings to draw: the held-out one with the largest reduction, and one with a temporary finding.
 fn chosen<'a>(
     report: &Report,
     pictures: &'a [RecordingPicture],
@@ -121,7 +121,7 @@ fn chosen<'a>(
     chosen
 }
 
-/// The recording in which something happened to this joint that did not happen in all.
+/// The recording with the largest reduction by a finding that acts at this joint in this recording only.
 fn eventful<'a>(
     report: &Report,
     pictures: &'a [RecordingPicture],
@@ -139,7 +139,7 @@ fn eventful<'a>(
         .map(|(picture, _)| picture)
 }
 
-/// Sums of squared residuals, before and after.
+/// Sums of squared residuals before and after the correction.
 fn squares(drawn: &JointPicture) -> (f64, f64) {
     let squares = |expected: &[f64]| -> f64 {
         let residuals = drawn.measured.iter().zip(expected);
@@ -149,12 +149,12 @@ fn squares(drawn: &JointPicture) -> (f64, f64) {
     (squares(&drawn.before), squares(&drawn.after))
 }
 
-/// A time in which a finding acts.
+/// A period in which a finding acts.
 struct Span {
     title: String,
     from_s: f64,
     to_s: f64,
-    /// In this recording and not in all.
+    /// Whether it acts in this recording and not in all.
     here_only: bool,
 }
 
@@ -206,7 +206,7 @@ fn spans(
     report.findings.iter().filter_map(span).collect()
 }
 
-/// Measured and expected effort, and below them the residuals.
+/// Plots of measured and expected effort, with the residuals below.
 fn over_time(
     picture: &RecordingPicture,
     drawn: &JointPicture,
@@ -235,7 +235,7 @@ fn over_time(
         Axis::over(residuals, 396.0, 252.0),
     );
     let (Some(time), Some(effort), Some(residual)) = axes else {
-        return html! { p.muted { "Nothing to draw of " (row.joint) " in " (picture.recording) "." } };
+        return html! { p.muted { "No data of " (row.joint) " in " (picture.recording) "." } };
     };
     let above = Panel {
         x: time.clone(),
@@ -274,7 +274,7 @@ fn over_time(
     }
 }
 
-/// A residual and what it may depend on.
+/// A residual with the quantities that it may depend on.
 struct Dot {
     velocity: f64,
     position: f64,
@@ -283,10 +283,10 @@ struct Dot {
     after: f64,
 }
 
-/// What a dot stands at.
+/// Horizontal coordinate of a dot.
 type Of = fn(&Dot) -> f64;
 
-/// The residual against velocity, position and load: friction, springs and gains each have a shape of their own.
+/// Plots of the residual over velocity, position and load, where friction, springs and gains have distinct shapes.
 fn scatters(pictures: &[RecordingPicture], joint: &str, unit: &str) -> Markup {
     let any_held_out = pictures
         .iter()

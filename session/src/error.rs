@@ -1,4 +1,4 @@
-//! Why a recording gives no joint states of a robot.
+//! Errors of recordings without usable joint states of a robot.
 
 use std::path::PathBuf;
 
@@ -9,13 +9,13 @@ use crate::finding::{Finding, shared};
 use crate::publisher::Publisher;
 use crate::suggest::{self, on};
 
-/// Why a recording gives no joint states of a robot.
+/// Reason why a recording has no usable joint states of a robot.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
-    /// It cannot be read.
+    /// The recording cannot be read.
     #[error(transparent)]
     Archive(#[from] ArchiveError),
-    /// It has no topic of joint states.
+    /// The recording has no topic of joint states.
     #[error("{}: no topic of joint states; {}", path.display(), topics(known))]
     NoJointStates {
         /// The recording.
@@ -23,7 +23,7 @@ pub enum SessionError {
         /// Name and type of its topics.
         known: Vec<String>,
     },
-    /// Several topics give the robot's joint states equally well.
+    /// Several topics have equally suitable joint states of the robot.
     #[error(
         "{}: {} give joint states of the robot equally well; choose one with --state-topic",
         path.display(),
@@ -35,7 +35,7 @@ pub enum SessionError {
         /// The topics.
         topics: Vec<String>,
     },
-    /// There are more joints than a sample has room for.
+    /// More joints than a sample can hold.
     #[error(
         "{}: {found} joints, and at most {MAX_JOINTS} can be compared at once: explain parts of the robot one after the other, each with a \
          robot file in which the joints of the others are fixed",
@@ -47,7 +47,7 @@ pub enum SessionError {
         /// Number of joints.
         found: usize,
     },
-    /// None of its joint states can be used.
+    /// None of the joint states can be used.
     #[error("{}: {why}", path.display())]
     Unusable {
         /// The recording.
@@ -57,8 +57,8 @@ pub enum SessionError {
     },
 }
 
-/// A sentence for each reason why recordings, of `count` in total, cannot be used; recordings with the same reason share
-/// one.
+/// Returns a sentence for each reason why recordings, of `count` in total, cannot be used; recordings with the same
+/// reason share one.
 pub fn by_reason(errors: &[SessionError], count: usize) -> Vec<String> {
     let texts = errors.iter().map(|error| match error {
         SessionError::Unusable { path, why } => (path.display().to_string(), why.to_string()),
@@ -75,10 +75,10 @@ pub fn by_reason(errors: &[SessionError], count: usize) -> Vec<String> {
     sentences.map(sentence).collect()
 }
 
-/// Why no state of a robot could be assembled from joint states.
+/// Reason why no state of a robot could be assembled from joint states.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unusable {
-    /// A field of a joint is never a number.
+    /// A field of a joint that is never a number.
     #[error("{field} of joint `{joint}` is NaN throughout ({messages} messages)")]
     NotFiniteThroughout {
         /// The joint.
@@ -93,7 +93,7 @@ pub enum Unusable {
     NamedTwice(Twice),
     /// Joints of the robot that no message names.
     #[error(
-        "no joint state names {}. {}. Give the robot file of the arm that was recorded, or make a joint that nobody records `fixed`",
+        "no joint state names {}. {}. Give the robot file of the arm that was recorded, or make the joints that are not recorded `fixed`",
         named(missing),
         publishers(all)
     )]
@@ -111,7 +111,7 @@ pub enum Unusable {
         /// Number of messages.
         messages: u64,
     },
-    /// A finding that leaves nothing to use.
+    /// A finding that excludes all states.
     #[error("no joint state{} can be used: {finding}", on(topic.as_deref()))]
     Finding {
         /// The topic; none of a table.
@@ -119,7 +119,7 @@ pub enum Unusable {
         /// The finding.
         finding: Box<Finding>,
     },
-    /// Messages that never complete a state, or none at all.
+    /// Messages that never complete a state, or no messages.
     #[error("{messages} joint states make no whole sample")]
     NoSample {
         /// Number of messages.
@@ -128,7 +128,7 @@ pub enum Unusable {
 }
 
 impl Unusable {
-    /// The finding, where it is one.
+    /// Returns the finding, if it is one.
     pub fn into_finding(self) -> Option<Finding> {
         match self {
             Self::Finding { finding, .. } => Some(*finding),

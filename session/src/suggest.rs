@@ -1,10 +1,10 @@
-//! "Did you mean": the known word nearest to one that is not known.
+//! "Did you mean": the known word nearest to an unknown one.
 
-/// Words less alike than this (Jaro-Winkler, 0 to 1) are not worth suggesting.
+/// Smallest similarity (Jaro-Winkler, 0 to 1) of a suggested word.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_SIMILARITY: f64 = 0.85;
 
-/// The known word that `word` was probably meant to be.
+/// Returns the known word that `word` was probably meant to be.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()
@@ -14,13 +14,13 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
-/// A help line: the nearest word if there is one, else all of them if they are few enough to read.
+/// Returns a help line: the nearest word if there is one, else all of them if they are few enough to read.
 pub fn help<'a>(
     word: &str,
     what: &str,
     known: impl IntoIterator<Item = &'a str>,
 ) -> Option<String> {
-    /// More known words than this are not listed.
+    /// Largest number of known words that are listed.
     /// Tuned: by eye, for the length of the message.
     const MOST_LISTED: usize = 16;
     let known: Vec<&str> = known.into_iter().collect();
@@ -32,15 +32,15 @@ pub fn help<'a>(
         .then(|| format!("{what}: {}", list(known.iter().copied())))
 }
 
-/// `` `a`, `b`, `c` ``.
+/// Formats words as `` `a`, `b`, `c` ``.
 pub fn list<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
     let quoted: Vec<String> = words.into_iter().map(|word| format!("`{word}`")).collect();
     quoted.join(", ")
 }
 
-/// The first few of many words.
+/// Formats the first few of many words.
 pub fn some(words: &[&str]) -> String {
-    /// How many words are named.
+    /// Largest number of named words.
     /// Tuned: by eye, for the length of the message.
     const MOST_NAMED: usize = 8;
     let first = words[..words.len().min(MOST_NAMED)].join(", ");
@@ -50,7 +50,7 @@ pub fn some(words: &[&str]) -> String {
     }
 }
 
-/// ` on /joint_states`, or nothing.
+/// Returns ` on /joint_states`, or nothing.
 pub(crate) fn on(topic: Option<&str>) -> String {
     topic.map_or_else(String::new, |topic| format!(" on {topic}"))
 }

@@ -1,30 +1,32 @@
-//! Values that no measurement gives: against the range of the joint's own values and the limits of the robot file.
+//! Values that cannot be measurements: detected from the range of the joint's own values and the limits of the robot
+//! file.
 
 use crate::finding::Times;
 
 /// Effort that no drive exceeds, as a multiple of the limit in the robot file.
 /// Physical: a drive's peak torque is two to three times its rated one, and some files give the rated one.
 const TIMES_LIMIT: f64 = 10.0;
-/// Magnitude that is no measurement, as a multiple of what nine of ten values of all joints stay below.
-/// Physical: an arm that mostly rests in a balanced pose shows some hundredth of the effort of its motion.
+/// Magnitude that is not a measurement, as a multiple of the baseline: the largest 90 % quantile of all joints.
+/// Physical: an arm that mostly rests in a balanced pose has about a hundredth of the effort of its motion.
 const TIMES_USUAL: f64 = 1000.0;
-/// Quantile of the magnitudes that counts as usual.
+/// Quantile of the magnitudes that serves as the baseline.
 /// Statistical: garbage in less than a tenth of the messages does not move it.
 const QUANTILE: f64 = 0.9;
-/// Fewer values tell no range.
+/// Smallest number of values for a range.
 /// Resolution: a second at 100 Hz.
 const LEAST_VALUES: u64 = 100;
-/// Step to zero that is a dropout, as a multiple of what 19 of 20 steps of the joint's effort stay below.
+/// Step to zero that is a dropout, as a multiple of the 95 % quantile of the joint's steps.
 /// Statistical: normally distributed steps reach eight standard deviations in one of 10^15 samples.
 const TIMES_STEP: f64 = 4.0;
-/// Quantile of the steps that counts as usual. A quantised effort often does not change, so the median may be zero.
+/// Quantile of the steps that serves as the baseline. A quantised effort often does not change, so the median may be
+/// zero.
 const STEP_QUANTILE: f64 = 0.95;
-/// A joint whose effort is zero in more than this share of the messages has no dropouts: zero is one of its values.
+/// Share of zero efforts above which a joint has no dropouts, because zero is one of its values.
 /// Physical: a coarse quantisation rounds small efforts to zero.
 const MOST_ZEROS: f64 = 0.1;
 
-/// Magnitudes other than zero by their binary exponent: a histogram of bounded size for values of any size. Zeros are
-/// counted apart, because a joint that mostly rests has a range all the same.
+/// Histogram of nonzero magnitudes by their binary exponent: of bounded size for values of any size. Zeros are
+/// counted separately, so that a joint that mostly rests has a range, too.
 #[derive(Debug, Clone)]
 struct Magnitudes {
     /// Counts of `[2^(i - OFFSET), 2^(i + 1 - OFFSET))`.
@@ -44,7 +46,7 @@ impl Default for Magnitudes {
 }
 
 impl Magnitudes {
-    /// Exponents from 2^-40 to 2^40: beyond what a unit of effort, position or time is written in.
+    /// Number of bins: exponents from 2^-40 to 2^40, beyond the range of any unit of effort, position or time.
     const BINS: usize = 80;
     const OFFSET: i32 = 40;
 
@@ -59,7 +61,7 @@ impl Magnitudes {
         self.counts[bin as usize] = self.counts[bin as usize].saturating_add(1);
     }
 
-    /// Upper edge of the bin that holds the quantile; `None` while there are too few values.
+    /// Returns the upper edge of the bin that contains the quantile; `None` while there are too few values.
     fn quantile(&self, share: f64) -> Option<f64> {
         let count = self.total - self.zeros;
         if count < LEAST_VALUES {
@@ -79,7 +81,7 @@ impl Magnitudes {
 #[derive(Debug, Clone, Default)]
 pub struct Ranges {
     joints: Vec<Joint>,
-    /// Magnitude beyond which a value is no measurement, by joint and field, from the values so far.
+    /// Magnitude above which a value is not a measurement, by joint and field, from the values so far.
     bounds: Vec<[f64; 3]>,
     values: u64,
 }
@@ -100,14 +102,14 @@ struct Joint {
 pub enum Judgement {
     /// It may be a measurement.
     Possible,
-    /// An effort of exactly zero in the middle of others.
+    /// An effort of exactly zero between other values.
     Dropout,
-    /// It is no measurement.
+    /// It cannot be a measurement.
     Impossible,
 }
 
 impl Ranges {
-    /// Ranges of joints with these effort limits; nothing seen yet.
+    /// Creates the ranges of joints with these effort limits.
     pub fn new(limits: impl IntoIterator<Item = Option<f64>>) -> Self {
         let limits = limits.into_iter();
         let joints: Vec<Joint> = limits
@@ -124,8 +126,8 @@ impl Ranges {
         }
     }
 
-    /// Takes a finite value of a joint's field (0 position, 1 velocity, 2 effort) and judges it by those before.
-    /// Values that are refused count for the range, too: where they are frequent, they are what the joint does.
+    /// Adds a finite value of a joint's field (0 position, 1 velocity, 2 effort) and judges it by the previous ones.
+    /// Refused values are included in the range, too: if they are frequent, they are real.
     pub fn take(&mut self, joint: usize, field: usize, value: f64) -> Judgement {
         let bound = self.bounds[joint][field];
         let of = &mut self.joints[joint];
@@ -142,7 +144,7 @@ impl Ranges {
         }
         of.fields[field].add(value);
         self.values += 1;
-        // An update now and then suffices: a range changes slowly.
+        // Occasional updates suffice, because a range changes slowly.
         if self.values.is_power_of_two() || self.values.is_multiple_of(1 << 14) {
             self.update();
         }
@@ -158,7 +160,7 @@ impl Ranges {
         self.update();
     }
 
-    /// Brings the bounds up to date with all values.
+    /// Updates the bounds with all values.
     pub fn update(&mut self) {
         let largest: [Option<f64>; 3] = std::array::from_fn(|field| {
             let usual = self.joints.iter();
@@ -179,7 +181,7 @@ impl Ranges {
         }
     }
 
-    /// Magnitude that nine of ten values of a joint's field stay below.
+    /// Returns the baseline of a joint's field: the magnitude that nine of ten values do not exceed.
     pub fn usual(&self, joint: usize, field: usize) -> f64 {
         let usual = self.joints[joint].fields[field].quantile(QUANTILE);
         usual.unwrap_or(f64::NAN)
@@ -187,7 +189,7 @@ impl Ranges {
 }
 
 impl Joint {
-    /// Whether a zero that follows is too large a step for this joint.
+    /// Whether a zero as the next value is too large a step for this joint.
     fn drops_to_zero(&self) -> bool {
         let (Some(last), Some(step)) = (self.last_effort, self.steps.quantile(STEP_QUANTILE))
         else {
@@ -201,11 +203,11 @@ impl Joint {
 
 const EFFORT: usize = 2;
 
-/// Times of refused values that are listed.
-/// Resolution: what a person reads.
+/// Largest number of listed times of refused values.
+/// Resolution: for a short text.
 const MOST_STARTS: usize = 3;
 
-/// Counts the values of one field of one joint that are no measurements.
+/// Counter of the values of one field of one joint that are not measurements.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Refused {
     pub messages: u64,
@@ -215,16 +217,16 @@ pub(crate) struct Refused {
     starts_ns: [i64; MOST_STARTS],
     /// Time of the last message \[ns\].
     last_ns: i64,
-    /// The value of the largest magnitude.
+    /// Value with the largest magnitude.
     pub example: f64,
-    /// A subnormal value, where there is one.
+    /// A subnormal value, if there is one.
     pub subnormal: Option<f64>,
-    /// Whether the newest message is one.
+    /// Whether the newest message was refused.
     goes_on: bool,
 }
 
 impl Refused {
-    /// Takes a value, refused or not.
+    /// Adds a value, refused or not.
     pub fn add(&mut self, time_ns: i64, value: f64, is_refused: bool) {
         if is_refused {
             self.messages += 1;
@@ -245,7 +247,7 @@ impl Refused {
         self.goes_on = is_refused;
     }
 
-    /// Number and times of the messages, in seconds since `first_ns`.
+    /// Returns number and times of the messages, in seconds since `first_ns`.
     pub fn times(&self, first_ns: i64) -> Times {
         let since_s = |ns: i64| (ns - first_ns) as f64 * 1e-9;
         let starts = self.starts_ns.iter().take(self.runs as usize);
@@ -305,7 +307,7 @@ mod tests {
             }
         };
         assert!(judged(Some(30.0), spikes(1.0)).contains(&Judgement::Impossible));
-        // Milliamperes beside a limit in N m.
+        // Milliamperes, compared with a limit in N m.
         assert!(!judged(Some(30.0), spikes(100.0)).contains(&Judgement::Impossible));
     }
 

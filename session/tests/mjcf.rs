@@ -1,6 +1,6 @@
 //! MuJoCo models as robots: efforts are those that MuJoCo computes (`tests/simulators/reference.py`).
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::path::PathBuf;
 

@@ -1,27 +1,27 @@
-//! Tells when the clock that stamps the joint states jumps against the time of their reception.
+//! Detection of jumps of the clock that stamps the joint states, relative to the time of reception.
 
 use tauscope_bus::JointState;
 
-/// A clock that moves by more than this from one sample to the next was set \[ns\].
-/// Resolution: above what networks delay, below what a person sets a clock by.
+/// Smallest change of (stamp - time of reception) between two samples that is treated as a jump \[ns\].
+/// Resolution: above network delays, below the step by which a person sets a clock.
 const JUMP_NS: i64 = 1_000_000_000;
-/// A clock that jumps to and fro is told of once in so long \[ns\].
-/// Resolution: what a person reads.
+/// Shortest time between two reports of a clock that jumps repeatedly \[ns\].
+/// Resolution: a rate that a person can read.
 const TOLD_EVERY_NS: i64 = 10_000_000_000;
 
-/// The clock of one source.
+/// Jump detector for the clock of one source.
 #[derive(Debug, Default)]
 pub struct Clock {
-    /// Stamp and time of reception of the sample before \[ns\].
+    /// Stamp and time of reception of the previous sample \[ns\].
     before: Option<(i64, i64)>,
-    /// When a jump was told of last, in time of reception \[ns\].
+    /// Time of reception at which a jump was last reported \[ns\].
     told_ns: Option<i64>,
-    /// Jumps that were not told of yet, and their sum \[ns\].
+    /// Number of jumps that are not reported yet, and their sum \[ns\].
     untold: (usize, i64),
 }
 
 impl Clock {
-    /// What is to be said of a sample; usually nothing.
+    /// Takes a sample; returns a line if a jump is to be reported.
     pub fn line(&mut self, state: &JointState) -> Option<String> {
         let now = (state.header.stamp_ns, state.header.received_ns);
         let before = self.before.replace(now)?;
@@ -68,12 +68,12 @@ mod tests {
         let said = [
             (0.0, 0.0),
             (0.1, 0.1),
-            // Both clocks agree that nothing came for a minute.
+            // A pause of a minute, on both clocks.
             (60.1, 60.1),
             (3660.2, 60.2),
-            // It goes on from there, and comes back later.
+            // No further jump.
             (3660.3, 60.3),
-            // Soon after the first, so it is told later.
+            // The jump back, too soon after the first report: reported later.
             (62.0, 62.0),
             (80.0, 80.0),
             (80.1, 80.1),

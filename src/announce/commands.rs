@@ -1,5 +1,4 @@
-//! Tells the supervisor, and so people, which commands the source of a cell has taken, when a mute ends, and when its
-//! clock jumps.
+//! Reports to the supervisor which commands the source of a cell accepts, when a mute ends, and when its clock jumps.
 
 use std::time::Duration;
 
@@ -7,29 +6,29 @@ use super::clock::Clock;
 use tauscope_bus::command::MuteLease;
 use tauscope_bus::{Emit, JointState, LinkError, Progress, Source, StageError, Trouble, shell};
 
-/// What holds at a source while its cell is muted.
+/// Condition that a source reports while its cell is muted.
 pub const MUTED: &str = "muted";
 
-/// A source whose commands are told to the supervisor. Its stream is untouched.
+/// A source whose accepted commands are reported to the supervisor; its output stream is unchanged.
 pub struct Announced<S> {
     source: S,
     told: Told,
 }
 
-/// What has been told so far.
+/// State of the reports of one source.
 #[derive(Debug, Default)]
 struct Told {
-    /// Who takes them.
+    /// Name of the source.
     stage: String,
-    /// Stamp of the first sample, from which times are counted \[ns\].
+    /// Stamp of the first sample, the origin of reported times \[ns\].
     start_ns: Option<i64>,
-    /// The mute, while there is one.
+    /// The mute that is in effect, if any.
     mute: Option<MuteLease>,
     clock: Clock,
 }
 
 impl<S> Announced<S> {
-    /// Any source, of that name.
+    /// Wraps `source`, which is called `name`.
     pub fn new(name: &str, source: S) -> Self {
         let told = Told {
             stage: name.to_owned(),
@@ -86,7 +85,7 @@ impl Told {
         self.mute.is_some()
     }
 
-    /// What is to be said of a sample.
+    /// Returns the lines to report for a sample.
     fn lines(&mut self, state: &JointState) -> impl Iterator<Item = String> + use<> {
         let now_ns = state.header.stamp_ns;
         let start_ns = *self.start_ns.get_or_insert(now_ns);

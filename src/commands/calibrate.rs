@@ -21,25 +21,23 @@ use crate::interrupt;
 use crate::output::Output;
 use crate::progress::{Progress, Quiet};
 
-/// Below this share of the measured effort's variance that the model explains, the gain is worth
-/// little.
+/// Fraction of the measured effort's variance explained by the model below which a gain is reported as unreliable.
 const WEAK: f64 = 0.5;
 
-/// Learn gain, offset and noise per joint from contact-free recordings, and what the detectors'
-/// scores do while nothing touches the robot.
+/// Fit gain, offset and noise per joint to contact-free recordings, and measure the detectors' scores on them.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Args {
-    /// Contact-free recordings that the gains are fitted on.
+    /// Contact-free recordings to which the gains are fitted.
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
     /// The robot's URDF.
     #[arg(long, value_name = "URDF")]
     robot: PathBuf,
-    /// Where the corrected twin goes.
+    /// File for the corrected twin.
     #[arg(long, default_value = "twin.yaml")]
     out: PathBuf,
-    /// Contact-free recordings that noise and scores, and so the detectors' thresholds, are measured
-    /// on; without them, those of the fit, on which both come out too small.
+    /// Contact-free recordings on which noise and scores, and so the detectors' thresholds, are measured; by default
+    /// those of the fit, on which both come out too small.
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     validation: Vec<PathBuf>,
     /// Unit of the measured effort.
@@ -54,7 +52,7 @@ pub struct Args {
     /// Topic of the commanded motion, for `--motion commanded`.
     #[arg(long)]
     command_topic: Option<String>,
-    /// Topic of another twin's effort: it is corrected instead of the URDF's.
+    /// Topic of an external twin's effort, which is corrected instead of the URDF's.
     #[arg(long)]
     twin_topic: Option<String>,
     /// The motion whose effort is computed.
@@ -63,7 +61,7 @@ pub struct Args {
     /// Low-pass on the velocity before it is differentiated, in Hz.
     #[arg(long, default_value_t = tauscope_twin::Filters::default().velocity_cutoff_hz)]
     velocity_cutoff_hz: f64,
-    /// Low-pass on measured and expected effort, in Hz; without it each joint's is chosen, 4.5 or as much faster as costs
+    /// Low-pass on measured and expected effort, in Hz; by default chosen per joint: 4.5, or higher where that adds
     /// no noise.
     #[arg(long)]
     effort_cutoff_hz: Option<f64>,
@@ -71,7 +69,7 @@ pub struct Args {
     force: Force,
     #[command(flatten)]
     quiet: Quiet,
-    /// Machine-readable.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -161,7 +159,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     Ok(Exit::from_loss(calibrated.lost > 0))
 }
 
-/// A low-pass above half the rate of a recording would pass everything, noise included.
+/// Rejects a low-pass above half the sampling rate of a recording: it would pass everything, noise included.
 fn check_cutoffs(args: &Args) -> Result<(), Failure> {
     let cutoffs = [
         ("--velocity-cutoff-hz", args.velocity_cutoff_hz),
@@ -188,7 +186,7 @@ fn check_cutoffs(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What went in, by name and hash.
+/// Returns the program's version and the hashes of the inputs, by name.
 fn provenance(args: &Args) -> anyhow::Result<std::collections::BTreeMap<String, String>> {
     let mut all = std::collections::BTreeMap::new();
     all.insert("tauscope".to_owned(), env!("CARGO_PKG_VERSION").to_owned());
@@ -207,7 +205,7 @@ fn provenance(args: &Args) -> anyhow::Result<std::collections::BTreeMap<String, 
     Ok(all)
 }
 
-/// Writes the twin beside `path` and moves it there once it is whole.
+/// Writes the twin to `path`, whole or not at all.
 fn write(path: &Path, file: &TwinFile) -> Result<(), Failure> {
     let text = serde_saphyr::to_string(file).context("the twin")?;
     whole_file::write(path, text, Existing::Replace).map_err(|error| {

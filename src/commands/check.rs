@@ -17,20 +17,20 @@ pub struct Args {
     /// The pipeline file, or another one with `--kind`; by default `pipeline.yaml`.
     #[arg(conflicts_with = "pipeline")]
     file: Option<PathBuf>,
-    /// The same, as `replay` takes it.
+    /// The pipeline file, as an option like that of `replay`.
     #[arg(long, value_name = "FILE")]
     pipeline: Option<PathBuf>,
-    /// What kind of file it is. Of those that are no pipeline the shape is checked: every key, every
-    /// type, every unit of choice.
+    /// Kind of the file. Files other than pipelines are checked against their schema: keys, types and enumerated
+    /// values.
     #[arg(long, value_enum, default_value_t)]
     kind: FileKind,
     /// Look for recordings and programs for the stages of this host only.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
-    /// How to print it.
+    /// Output format.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
-    /// The same as `--format json`.
+    /// Short for `--format json`.
     #[arg(long, conflicts_with = "format")]
     json: bool,
 }
@@ -50,11 +50,11 @@ enum Format {
     Mermaid,
     /// A Graphviz digraph.
     Dot,
-    /// Machine-readable.
+    /// JSON.
     Json,
 }
 
-/// Checks and prints. For a program the errors are printed, too: an empty list where nothing is wrong.
+/// Checks the file and prints the result. In JSON, errors are part of the result: an empty list if there are none.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let outcome = check(args, out);
     if let Err(Failure::Rejected(report)) = &outcome

@@ -6,7 +6,7 @@ use crate::exit::{Exit, Failure};
 use crate::output::Output;
 use crate::program_beside::{self, Program};
 
-/// What runs. Its own `--help` says more, where it is built.
+/// The program behind the command. Its own `--help`, once it is built, has more detail.
 const PROGRAM: Program = Program {
     name: "tauscope-cluster",
     help: "\
@@ -23,7 +23,7 @@ Options:
   -h, --help  Print help",
 };
 
-/// Queries on several machines: a scheduler, its executors, and who asks: `tauscope cluster --help` (docs/query.md).
+/// Query archives on several machines, with a scheduler and executors: `tauscope cluster --help` (docs/query.md).
 #[derive(Debug, clap::Args)]
 #[command(disable_help_flag = true)]
 pub struct Args {
@@ -32,7 +32,7 @@ pub struct Args {
     arguments: Vec<OsString>,
 }
 
-/// Runs it.
+/// Runs the program.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     program_beside::run(PROGRAM, &args.arguments, out)
 }

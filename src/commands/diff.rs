@@ -21,10 +21,10 @@ use crate::exit::{Exit, Failure};
 use crate::output::Output;
 use crate::progress::Quiet;
 
-/// Differences that a terminal is shown; `--json` and `--html` have all.
+/// Maximum number of differences shown on a terminal; `--json` and `--html` have all.
 const MAX_SHOWN: usize = 40;
 
-/// What is told of a difference; the first column says what became of it.
+/// Columns of the table of differences; the first one, without a title, is the kind of change.
 const COLUMNS: [&str; 7] = [
     "",
     "cell",
@@ -45,21 +45,21 @@ pub struct Args {
     /// For pipeline files: the recordings.
     #[arg(long, value_name = "FILE", requires = "out")]
     manifest: Option<PathBuf>,
-    /// For pipeline files: the folder that keeps their results, in `a` and `b`. What is there is not done again.
+    /// For pipeline files: the folder for their results, in `a` and `b`. Existing results are reused.
     #[arg(long, value_name = "DIR", requires = "manifest")]
     out: Option<PathBuf>,
-    /// For pipeline files: how many recordings are worked on at once.
+    /// For pipeline files: number of recordings replayed in parallel.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     jobs: u16,
-    /// Alarms of one contact that are no further apart are the same \[s\].
+    /// Largest time between two alarms, one from each result, that are treated as the same event [s].
     #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = tolerance)]
     tolerance_s: f64,
-    /// Also write a page.
+    /// Also write the comparison as an HTML page.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
     #[command(flatten)]
     force: Force,
-    /// Machine-readable.
+    /// Print the comparison as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -73,7 +73,7 @@ fn tolerance(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Compares them.
+/// Compares the two results and prints the differences.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let inputs = [&args.a, &args.b].into_iter().chain(&args.manifest);
     args.force.check_beside(args.html.clone(), inputs)?;
@@ -103,7 +103,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     Ok(lost_a.and(lost_b))
 }
 
-/// That both results are one, if they are: then nothing can differ.
+/// Returns a note if both results are the same file or folder, so that nothing can differ.
 fn same(a: &Path, b: &Path) -> Option<String> {
     let real = |path: &Path| path.canonicalize().ok();
     let is_same = real(a).is_some_and(|real_a| real(b) == Some(real_a));
@@ -113,7 +113,7 @@ fn same(a: &Path, b: &Path) -> Option<String> {
     })
 }
 
-/// Why a folder is not the result of one pipeline, and which folder within it is.
+/// Explains why a folder is not the result of one pipeline, and suggests folders within it that are.
 fn ambiguous(args: &Args, error: &Ambiguous, note: Option<&str>) -> Failure {
     let folder = if error.result == "A" {
         &args.a
@@ -142,7 +142,7 @@ fn ambiguous(args: &Args, error: &Ambiguous, note: Option<&str>) -> Failure {
     Failure::Rejected(Problem::new(title).help(&help).into())
 }
 
-/// Reads a result; one of a pipeline file is made first.
+/// Reads a result; for a pipeline file, first makes it by a replay.
 fn result(
     args: &Args,
     given: &Path,
@@ -190,7 +190,7 @@ fn result(
     Ok((results, exit))
 }
 
-/// For people.
+/// Formats the comparison for a terminal.
 fn text(comparison: &Comparison) -> String {
     let mut text = format!("{}\n", headline(comparison));
     for (name, only) in [("A", &comparison.only_in_a), ("B", &comparison.only_in_b)] {
@@ -227,7 +227,7 @@ fn table<const N: usize>(header: [&str; N]) -> Table {
     table
 }
 
-/// How many recordings and events, in a sentence.
+/// Returns the numbers of recordings, events and changes as a sentence.
 fn headline(comparison: &Comparison) -> String {
     let mut total = Counts::default();
     for counts in comparison.cells.values() {
@@ -247,14 +247,14 @@ fn headline(comparison: &Comparison) -> String {
     )
 }
 
-/// The counts by cell, and within each cell by link and joint.
+/// Returns the counts by cell, and within each cell by link and joint.
 fn places(comparison: &Comparison) -> Vec<(String, Counts)> {
     let mut places = Vec::new();
     for (cell, &counts) in &comparison.cells {
         places.push((format!("cell {cell}"), counts));
         for (kind, within) in [("link", &comparison.links), ("joint", &comparison.joints)] {
             for (name, &counts) in within.get(cell).into_iter().flatten() {
-                let name = if name.is_empty() { "not told" } else { name };
+                let name = if name.is_empty() { "unknown" } else { name };
                 places.push((format!("  {kind} {name}"), counts));
             }
         }
@@ -262,7 +262,7 @@ fn places(comparison: &Comparison) -> Vec<(String, Counts)> {
     places
 }
 
-/// A difference as a line of a table.
+/// Returns a difference as a row of the table.
 fn row(difference: &Difference) -> [String; 7] {
     let both = [&difference.a, &difference.b];
     let told = || both.into_iter().flatten();

@@ -9,27 +9,27 @@ use crate::doctor::{Level, Verdict, facts, verdicts};
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
 
-/// Look for what on this machine would keep a pipeline from running, and say what to do about it.
+/// Check this machine for anything that would keep a pipeline from running, and suggest remedies.
 ///
-/// Exit code 0 if nothing would, 1 if something would.
+/// Exit code 0 if there is no error, else 1.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A pipeline file: its folders, ports, peers and certificates are looked at, too.
+    /// A pipeline file, whose folders, ports, peers and certificates are checked, too.
     #[arg(long, value_name = "FILE")]
     pipeline: Option<PathBuf>,
-    /// Which of the file's hosts this is, where it names several.
+    /// Name of this host in the file, if the file has several.
     #[arg(long, value_name = "NAME", requires = "pipeline")]
     host: Option<String>,
-    /// Machine-readable.
+    /// Print the results as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Looks, and prints a line for each thing.
+/// Runs the checks and prints a line for each.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let host = args.host.as_deref();
     let pipeline = args.pipeline.as_ref();
-    // A recorder's folder that cannot be written to is one of its errors: told as `check` tells it.
+    // Loading rejects a recorder's folder that is not writable, with the same message as `check`.
     let pipeline = pipeline
         .map(|path| Pipeline::load(path, host))
         .transpose()?;

@@ -21,28 +21,28 @@ pub struct Args {
     /// The folder for events, scores, tables and the page.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Which detectors, separated by commas; without it those that fit the set, `all` for all.
+    /// Detectors, separated by commas, or `all`; by default those that suit the set.
     #[arg(long, value_name = "DETECTORS", value_delimiter = ',')]
     detectors: Vec<String>,
-    /// Behind which twin: `rigid`, `regression`, `topic`, or the path of a twin.yaml; may be given several
-    /// times. Without it `topic` where the set names one, `rigid` where it gives an
-    /// impedance and efforts are in N m, else `regression`.
+    /// Twin behind which the detectors run: `rigid`, `regression`, `topic`, or the path of a twin.yaml; may be given
+    /// several times. By default `topic` where the set names one, `rigid` where it gives an impedance and efforts are
+    /// in N m, else `regression`.
     #[arg(long, value_name = "TWIN")]
     twin: Vec<String>,
-    /// Low-pass on the velocity before it is differentiated, in Hz; without it the twin's own.
+    /// Low-pass on the velocity before it is differentiated, in Hz; by default the twin's own.
     #[arg(long, value_name = "HZ", value_parser = cutoff)]
     velocity_cutoff_hz: Option<f64>,
-    /// Low-pass on measured and expected effort, in Hz; without it the twin's own.
+    /// Low-pass on measured and expected effort, in Hz; by default the twin's own.
     #[arg(long, value_name = "HZ", value_parser = cutoff)]
     effort_cutoff_hz: Option<f64>,
-    /// How many detectors are worked on at once.
+    /// Number of detectors evaluated in parallel.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     jobs: u16,
     #[command(flatten)]
     force: Force,
     #[command(flatten)]
     quiet: Quiet,
-    /// Machine-readable.
+    /// Print the results as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -54,7 +54,7 @@ fn cutoff(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Evaluates, and writes what came of it.
+/// Evaluates the detectors and writes the results.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let options = Options {
         detectors: args.detectors.clone(),
@@ -79,7 +79,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         if error.is_input() {
             Failure::rejected(error.to_string())
         } else {
-            // Its text holds what caused it.
+            // The error's text includes its causes.
             Failure::Failed(anyhow::Error::msg(error.to_string()))
         }
     })?;
@@ -102,7 +102,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     Ok(Exit::from_loss(evaluation.lost > 0))
 }
 
-/// For machines.
+/// The results for `--json`.
 #[derive(Debug, Serialize)]
 struct Summary<'a> {
     set: &'a str,
@@ -118,7 +118,7 @@ struct Numbered<'a> {
     detector: &'a str,
     twin: &'a str,
     threshold: f64,
-    /// Over the labelled test recordings, by seed; `null` where nothing was scored.
+    /// Scores over the labelled test recordings, by seed; `null` where nothing was scored.
     seeds: &'a [tauscope_evaluate::Numbers],
 }
 

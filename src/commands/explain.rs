@@ -14,61 +14,60 @@ use crate::interrupt;
 use crate::output::Output;
 use crate::progress::{Progress, Quiet};
 
-/// Shares of the bar: reading ends here, and here the engine.
+/// Fractions of the progress bar at which reading ends, and at which the engine ends.
 const READ: f64 = 0.05;
 const EXPLAINED: f64 = 0.95;
 
-/// Say which physics the twin leaves out, model it, and prove on recordings that were never fitted that the
-/// error falls.
+/// Identify the physics that the twin lacks, model it, and verify on held-out recordings that the error falls.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A case, which is a YAML file that names robot and recordings; or recordings that may be fitted.
+    /// A case, which is a YAML file that names robot and recordings; or recordings to fit.
     #[arg(value_name = "CASE|RECORDING", required_unless_present = "fit")]
     inputs: Vec<PathBuf>,
-    /// The folder that the report, the corrected twin and the predictions go to.
+    /// The folder for the report, the corrected twin and the predictions.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The robot's URDF.
     #[arg(long, value_name = "URDF")]
     robot: Option<PathBuf>,
-    /// Recordings that may be fitted, as those without an option.
+    /// Recordings to fit, like those given without an option.
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     fit: Vec<PathBuf>,
-    /// Recordings that nothing is fitted on; without them some of those to fit are held out.
+    /// Recordings that are held out from the fit; by default some of those to fit.
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     holdout: Vec<PathBuf>,
-    /// Unit of the measured effort; N m without it.
+    /// Unit of the measured effort; by default N m.
     #[arg(long, value_parser = effort_unit())]
     effort_unit: Option<EffortUnit>,
     /// Torque constant of a joint in N m/A, for efforts in A; for all joints or for none.
     #[arg(long, value_name = "JOINT=CONSTANT", value_parser = super::calibrate::joint_constant)]
     torque_constant: Vec<(String, f64)>,
-    /// A corrected twin to start from: what is found has changed since.
+    /// A corrected twin to start from; the findings are changes since then.
     #[arg(long, value_name = "TWIN")]
     twin: Option<PathBuf>,
-    /// Topic of another twin's effort, which takes the place of the URDF's.
+    /// Topic of an external twin's effort, which replaces the URDF's.
     #[arg(long, value_name = "TOPIC")]
     twin_topic: Option<String>,
-    /// Topic of the measured joint states; without it the one that gives efforts of most of the robot's joints.
+    /// Topic of the measured joint states; by default the one with efforts of most of the robot's joints.
     #[arg(long, value_name = "TOPIC")]
     state_topic: Option<String>,
-    /// An effect, or a fault of recordings such as `effort_unit`, that is not considered; may be given several times.
+    /// An effect, or a fault of recordings such as `effort_unit`, that is excluded; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
     #[command(flatten)]
     force: Force,
     #[command(flatten)]
     quiet: Quiet,
-    /// Print the report as `report.json` holds it.
+    /// Print the report as it is in `report.json`.
     #[arg(long)]
     json: bool,
 }
 
 impl Args {
-    /// The case, if one is named.
+    /// Returns the case, if one is named.
     ///
     /// # Errors
-    /// Something beside it that the case itself says.
+    /// An argument that conflicts with the case, which specifies it itself.
     fn case(&self) -> Result<Option<&Path>, Failure> {
         let is_case = |path: &PathBuf| {
             let extension = path.extension().and_then(OsStr::to_str);
@@ -120,7 +119,7 @@ impl Args {
     }
 }
 
-/// Explains, and writes what was found.
+/// Explains the recordings and writes the results.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let request = args.request()?;
     explain::refuse_to_replace(&args.out, &request, args.force)?;

@@ -16,7 +16,7 @@ use crate::output::Output;
 
 /// Write the corrections of a report into a simulator's own file.
 ///
-/// What the simulator cannot say is listed, in the file's first lines, too.
+/// Corrections that the simulator's format cannot express are listed, also in the first lines of the file.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The folder that `explain` wrote.
@@ -24,8 +24,8 @@ pub struct Args {
     /// The simulator whose file is written.
     #[arg(long, value_name = "SIMULATOR", value_parser = target)]
     to: Target,
-    /// The model that is corrected: everything else in it stays as it is. By default the robot that was explained; for `urdf` and `drake`
-    /// a MuJoCo model is made a URDF.
+    /// The model to correct; everything else in it is kept. By default the robot that was explained; for `urdf` and
+    /// `drake` a MuJoCo model is converted to a URDF.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// The new file.
@@ -42,7 +42,7 @@ fn target(name: &str) -> Result<Target, String> {
     })
 }
 
-/// Writes it.
+/// Writes the file.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let twin_path = args.report.join("twin.yaml");
     let text = std::fs::read_to_string(&twin_path).map_err(|error| {
@@ -106,12 +106,12 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Path of the robot that a report explains, if the report has it.
+/// Returns the path of the robot that a report explains, if the report has it.
 fn robot_of(twin: &TwinFile) -> Option<PathBuf> {
     twin.provenance.get("robot").map(PathBuf::from)
 }
 
-/// The text that is corrected, and the robot with what that text states of its drives.
+/// Returns the text to correct, and the robot with the drives that this text states.
 fn source(args: &Args, robot_path: &Path, robot: &Robot) -> Result<(String, Model), Failure> {
     let rejected =
         |path: &Path, error: String| Failure::Rejected(Problem::of_file(path, error).into());
@@ -132,11 +132,11 @@ fn source(args: &Args, robot_path: &Path, robot: &Robot) -> Result<(String, Mode
     let source = robot::source(robot_path);
     match source.map_err(|error| rejected(robot_path, error.to_string()))? {
         Source::Mjcf(text) if args.to == Target::Mjcf => Ok((text, own)),
-        // A URDF of the model states nothing of the drives yet.
+        // The converted URDF states nothing of the drives yet.
         Source::Mjcf(_) => {
             robot::plain_urdf(&robot.urdf).map_err(|error| rejected(robot_path, error.to_string()))
         }
-        // With plausible bodies in place of impossible ones, as the twin has them.
+        // With plausible inertias in place of implausible ones, as in the twin.
         Source::Urdf(_) => Ok((robot.urdf.clone(), own)),
     }
 }

@@ -16,58 +16,60 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::Output;
 
-/// Where cells are met, unless something else is said.
+/// Default endpoint of the router.
 const ROUTER: &str = "tcp/127.0.0.1:7447";
-/// Where the page is served, unless something else is said.
+/// Default address of the page.
 const PAGE: &str = "127.0.0.1:7460";
-/// Where incidents and history of a page are kept, unless something else is said.
+/// Default file for incidents and history of a served page.
 const STORE: &str = "fleet.sqlite";
-/// What `--json` waits for the cells' answers. Resolution: a status comes once a second.
+/// Time that `--json` waits for the cells' status.
+/// Resolution: a cell sends its status once per second.
 const GATHER: Duration = Duration::from_secs(3);
-/// How often the terminal is brought up to date.
+/// Refresh interval of the terminal.
 const SHOW: Duration = Duration::from_secs(1);
-/// How often it is looked whether somebody wants to leave.
+/// Poll interval for an interrupt.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// All cells at once: which run, which stand, which are silent, and what touched them.
+/// Show all cells: which are running, stopped or silent, and their contacts.
 ///
-/// Without options: a table that follows the cells, or, in a pipe, a line for each change. Ends with Ctrl-C.
+/// Without options: a table that follows the cells or, in a pipe, a line for each change, until Ctrl-C.
 ///
-/// `--json` ends with exit code 0 if every cell is there, 3 if one is stale, unknown or never seen or has lost samples,
-/// and 1 if no router and no cell is reached.
+/// `--json` ends with exit code 0 if every cell is connected, 3 if a cell is stale, unknown, never seen or has lost
+/// samples, and 1 if neither a router nor a cell is reached.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Serve the page at this address; without an address, at 127.0.0.1:7460. It is plain HTTP.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = PAGE)]
     serve: Option<SocketAddr>,
-    /// By which a proxy serves the page, such as `https://fleet.plant`: forms from there are taken. May be repeated.
+    /// Origin under which a proxy serves the page, such as `https://fleet.plant`: its forms are accepted. May be
+    /// repeated.
     #[arg(long, value_name = "ORIGIN", requires = "serve")]
     origin: Vec<Origin>,
-    /// Print what is known of all cells after 3 s as one JSON document.
+    /// Print the state of all cells after 3 s as one JSON document.
     #[arg(long, conflicts_with = "serve")]
     json: bool,
-    /// Where the cells are met: a router's endpoint; tcp/127.0.0.1:7447 if nothing else is given. May be repeated.
+    /// Endpoint of a router; by default tcp/127.0.0.1:7447, unless `--listen` is given. May be repeated.
     #[arg(long, value_name = "ENDPOINT")]
     connect: Vec<String>,
-    /// Where cells can connect to this host itself. May be repeated.
+    /// Endpoint on which this host itself accepts connections of cells. May be repeated.
     #[arg(long, value_name = "ENDPOINT")]
     listen: Vec<String>,
-    /// A cell that is expected: shown before it is there. May be repeated.
+    /// A cell that is expected, and shown even before it connects. May be repeated.
     #[arg(long, value_name = "CELL")]
     expect: Vec<String>,
-    /// Who may acknowledge, mute, label and note on the page; without it nobody.
+    /// File of the users who may acknowledge, mute, label and note on the page; without it the page is read-only.
     #[arg(long, value_name = "FILE")]
     users: Option<PathBuf>,
-    /// Add a user to the file of `--users`, print the token, and end.
+    /// Add a user to the file of `--users`, print the token, and exit.
     #[arg(long, value_name = "NAME", requires = "users")]
     add_user: Option<String>,
-    /// Where contacts, incidents and history are kept (SQLite); with `--serve` fleet.sqlite if nothing else is given.
+    /// SQLite file for contacts, incidents and history; with `--serve` by default fleet.sqlite.
     #[arg(long, value_name = "FILE")]
     store: Option<PathBuf>,
-    /// The folder of the nightly tables of `tauscope physics`: the page shows each arm's physics over weeks.
+    /// Folder of the nightly tables of `tauscope physics`: the page shows each arm's physics over weeks.
     #[arg(long, value_name = "DIR")]
     physics: Option<PathBuf>,
-    /// End after so many seconds.
+    /// Exit after this time.
     #[arg(long, value_name = "SECONDS")]
     seconds: Option<u64>,
 }
@@ -117,7 +119,7 @@ fn options(args: &Args) -> Options {
     }
 }
 
-/// An endpoint or a file that is none was given by the user.
+/// Treats a wrong endpoint or store as a wrong argument: the user gave it.
 fn failed(error: FleetError) -> Failure {
     match error {
         FleetError::Session(_) | FleetError::Store(_) => Failure::rejected(error.to_string()),
@@ -147,7 +149,7 @@ fn serve(
     Ok(server)
 }
 
-/// The document of the state once the cells had time to tell it.
+/// Prints the state of all cells as JSON, after waiting for their status.
 fn json(hub: &Hub, out: &mut Output) -> Result<Exit, Failure> {
     wait(GATHER);
     let snapshot = hub.snapshot();
@@ -170,7 +172,7 @@ fn judge(snapshot: &Snapshot) -> Exit {
     }
 }
 
-/// Shows the wall until somebody wants to leave: a table on a terminal, lines in a pipe.
+/// Shows the cells until an interrupt or the end of `--seconds`: a table on a terminal, lines in a pipe.
 fn follow(args: &Args, hub: &Hub, out: &mut Output) -> Result<(), Failure> {
     let redraws = matches!(out, Output::Terminal) && std::io::stdout().is_terminal();
     let end = args
@@ -180,7 +182,7 @@ fn follow(args: &Args, hub: &Hub, out: &mut Output) -> Result<(), Failure> {
     while !interrupt::is_asked() && end.is_none_or(|end| Instant::now() < end) {
         let snapshot = hub.snapshot();
         if redraws {
-            // Home, and clear what is below.
+            // Cursor to the top left corner, then clear the screen below it.
             out.print(&format!("\x1b[H\x1b[J{}", show::table(&snapshot)))?;
         } else {
             lines(&snapshot, &mut told, out)?;

@@ -9,23 +9,23 @@ use tauscope_session::{Finding, Publisher, SessionError, Survey};
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
 
-/// Say what is in a recording: its topics and rates, publishers, gaps, whose joints move and what is odd about them, damage.
+/// Summarise a recording: topics and rates, publishers, gaps, motion and anomalies of the joints, damage.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// An MCAP file, a rosbag2 folder, a `.db3`, a `.bag` of ROS 1, a table (`.csv`), or an episode of a LeRobot data set
-    /// (`DATASET/episode_000003`).
+    /// An MCAP file, a rosbag2 folder, a `.db3`, a `.bag` of ROS 1, a table (`.csv`), or an episode of a LeRobot data
+    /// set (`DATASET/episode_000003`).
     recording: PathBuf,
-    /// Machine-readable.
+    /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Lines printed for a recording.
+/// The summary of a recording, as printed with `--json`.
 #[derive(Debug, Serialize)]
 struct Printed {
     #[serde(flatten)]
     info: Info,
-    /// By topic of joint states.
+    /// Publishers and findings, by topic of joint states.
     joint_states: Vec<Topic>,
 }
 
@@ -39,7 +39,7 @@ struct Topic {
     sentences: Vec<String>,
 }
 
-/// Prints it.
+/// Reads the recording and prints the summary.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let rejected = |error: SessionError| Failure::rejected(error.to_string());
     let recording = tauscope_session::open(&args.recording).map_err(|it| rejected(it.into()))?;
@@ -72,7 +72,7 @@ fn joint_states(recording: &Recording) -> Result<Vec<Topic>, SessionError> {
     each.collect()
 }
 
-/// The recording, then publishers and findings of each topic of joint states.
+/// Formats the recording, then publishers and findings of each topic of joint states.
 fn text(printed: &Printed) -> String {
     let mut text = printed.info.to_string();
     for topic in &printed.joint_states {
@@ -87,7 +87,7 @@ fn text(printed: &Printed) -> String {
                 text += &format!("  {publisher}\n");
             }
         }
-        // The lines on the topic count the messages that cannot be decoded.
+        // The summary of the topic already counts the messages that cannot be decoded.
         let findings = topic.findings.iter();
         let findings = findings.filter(|it| !matches!(it, Finding::Undecodable { .. }));
         let findings: Vec<String> = findings.map(|finding| format!("  {finding}.\n")).collect();

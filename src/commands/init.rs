@@ -16,11 +16,11 @@ use crate::interrupt;
 use crate::output::Output;
 use crate::progress::{Progress, Quiet};
 
-/// Set up a cell from contact-free recordings: a pipeline with the explained twin and a detector that has learnt.
+/// Set up a cell from contact-free recordings: a pipeline with an explained twin and a trained detector.
 ///
-/// It tells the unit of the effort, explains what the robot's model leaves out, lets the detector learn what is usual
-/// and tries it on recordings that it holds out. Five recordings of different motions, a minute or more together, are
-/// a good start; nothing may touch the robot in them.
+/// Determines the unit of the effort, explains the physics that the robot's model lacks, trains the detector and
+/// tests it on held-out recordings. Five recordings of different motions, a minute or more together, are a good
+/// start; nothing may touch the robot in them.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Recordings in which nothing touches the robot.
@@ -30,7 +30,7 @@ pub struct Args {
         value_name = "RECORDING"
     )]
     recordings: Vec<PathBuf>,
-    /// Record the running robot for so long instead, in five pieces. Let it move; nothing may touch it.
+    /// Record the running robot for this time instead, in five pieces. Let it move; nothing may touch it.
     #[arg(long, value_name = "SECONDS")]
     live: Option<f64>,
     /// The live source, as in the `ingest` of a pipeline file.
@@ -44,16 +44,16 @@ pub struct Args {
     /// The robot's URDF.
     #[arg(long, value_name = "URDF")]
     robot: PathBuf,
-    /// The folder for pipeline.yaml, twin.yaml, learnt.yaml and the page of what was found.
+    /// The folder for pipeline.yaml, twin.yaml, learnt.yaml and the page of findings.
     #[arg(long, value_name = "DIR", default_value = "cell")]
     out: PathBuf,
-    /// Unit of the measured effort; without it the recordings tell.
+    /// Unit of the measured effort; by default determined from the recordings.
     #[arg(long, value_parser = effort_unit())]
     effort_unit: Option<EffortUnit>,
-    /// Topic of the measured joint states; without it the one that names most of the robot's joints.
+    /// Topic of the measured joint states; by default the one with most of the robot's joints.
     #[arg(long, value_name = "TOPIC")]
     state_topic: Option<String>,
-    /// An effect, or a fault of recordings such as `effort_unit`, that is not considered; may be given several times.
+    /// An effect, or a fault of recordings such as `effort_unit`, that is excluded; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
     #[command(flatten)]
@@ -62,7 +62,7 @@ pub struct Args {
     quiet: Quiet,
 }
 
-/// Shares of the bar.
+/// Fractions of the progress bar at which reading ends, and at which explaining ends.
 const LOOKED: f64 = 0.05;
 const EXPLAINED: f64 = 0.75;
 
@@ -100,7 +100,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
             Ok(exit)
         }
         Err(failure) => {
-            // They stand on the page, which there is none of.
+            // The page would contain them, but is not written.
             for sentence in &sentences {
                 out.say(sentence);
             }
@@ -109,7 +109,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     }
 }
 
-/// The faults of recordings that had to be mended, so that no twin fits them as they are.
+/// Returns the problem that lists the faults of the recordings: uncorrected, no twin fits them.
 fn mended(report: &Report) -> Problem {
     let (mut faults, mut kinds) = (Vec::new(), Vec::new());
     for finding in report.mended() {
@@ -129,7 +129,7 @@ fn mended(report: &Report) -> Problem {
     ))
 }
 
-/// Explains the twin, lets the detector learn and writes the folder; gives the page.
+/// Explains the twin, trains the detector and writes the folder; returns the text of the page.
 fn set_up(
     args: &Args,
     folder: &Folder,
@@ -205,7 +205,7 @@ fn set_up(
     Ok((page, Exit::from_loss(kept.lost > 0)))
 }
 
-/// The unit that the explanation settled on.
+/// Returns the unit that the explanation has determined.
 fn unit_of(report: &Report) -> EffortUnit {
     if report.effort_unit == EffortUnit::A.as_str() {
         EffortUnit::A

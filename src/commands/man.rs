@@ -10,17 +10,17 @@ use crate::output::Output;
 
 /// Write the manual pages: `tauscope.1` and one for each command.
 ///
-/// To read one: `man DIR/tauscope-run.1`
+/// Read a page with `man DIR/tauscope-run.1`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that the pages go to.
+    /// The folder for the pages.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     force: Force,
 }
 
-/// Writes them for the `program`'s command line.
+/// Writes the pages for the command line of `program`.
 pub fn run(args: &Args, mut program: clap::Command, out: &mut Output) -> Result<Exit, Failure> {
     program.build();
     let pages = pages(&program).context("cannot make the pages")?;
@@ -41,10 +41,10 @@ fn write(path: &Path, page: &[u8]) -> anyhow::Result<()> {
     std::fs::write(path, page).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Name and text of the program's page and of each command's.
+/// Returns name and text of the program's page and of each command's.
 fn pages(program: &clap::Command) -> std::io::Result<Vec<(String, Vec<u8>)>> {
     let commands = program.get_subcommands().filter(|command| {
-        // Some are for the program itself; clap's own `help` repeats the pages.
+        // Hidden commands are internal; clap's own `help` repeats the pages.
         !command.is_hide_set() && command.get_name() != "help"
     });
     std::iter::once(program)

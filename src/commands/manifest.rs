@@ -15,7 +15,7 @@ use crate::exit::{Exit, Failure};
 use crate::output::Output;
 use crate::progress::{Progress, Quiet};
 
-/// Write down which recordings are wanted, with their hashes: what `replay --manifest` works through.
+/// List recordings with their hashes in a manifest, for `replay --manifest`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Recordings or patterns of them in quotes: 'archive/**/*.mcap'. Of a rosbag2 bag or a LeRobot
@@ -25,11 +25,11 @@ pub struct Args {
     /// The manifest: a line of JSON for each recording, with its path relative to this file.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// The `ingest` stage whose place these recordings take, where the pipeline has several. Manifests can be joined with
+    /// The `ingest` stage that these recordings replace, if the pipeline has several. Manifests can be joined with
     /// `cat`.
     #[arg(long)]
     source: Option<String>,
-    /// How many recordings are read at once.
+    /// Number of recordings read in parallel.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     jobs: u16,
     #[command(flatten)]
@@ -38,7 +38,7 @@ pub struct Args {
     quiet: Quiet,
 }
 
-/// Writes it.
+/// Reads the recordings and writes the manifest.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let recordings = expand(&args.recordings)?;
     args.force.check_beside([args.out.clone()], &recordings)?;
@@ -84,7 +84,7 @@ fn absolute(path: &Path) -> anyhow::Result<PathBuf> {
     .with_context(|| format!("where {} is", path.display()))
 }
 
-/// The recordings, those of a pattern in the order of their names, each once.
+/// Returns the recordings, each once; those of a pattern in the order of their names.
 fn expand(given: &[PathBuf]) -> Result<Vec<PathBuf>, Report> {
     let mut found = Vec::new();
     let mut report = Report::default();

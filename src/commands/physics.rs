@@ -16,16 +16,16 @@ use crate::interrupt;
 use crate::output::Output;
 use crate::physics::{self, Choice, LONGEST_S, Night};
 
-/// Measure an arm's friction, gain, offset, payload and backlash with intervals, to be followed over weeks.
+/// Measure an arm's friction, gain, offset, payload and backlash, with intervals, to follow them over weeks.
 ///
 /// Run it every night. It adds a table to a folder: `cell=CELL/date=DATE/physics-TIME.parquet`. `tauscope weeks` and
-/// `tauscope fleet --physics` say what has changed.
+/// `tauscope fleet --physics` report changes.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Recordings in which little touches the robot, or the folder that the recorder writes to.
     #[arg(required = true, value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
-    /// The folder of all cells' tables.
+    /// The folder for the tables of all cells.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The pipeline file of the cell: its robot, its unit, its twin.
@@ -39,14 +39,14 @@ pub struct Args {
     /// The robot's URDF, without a pipeline file.
     #[arg(long, value_name = "URDF")]
     robot: Option<PathBuf>,
-    /// The twin to measure beside, for example yesterday's; that of the pipeline if nothing else is given.
+    /// The twin to compare with, for example yesterday's; by default that of the pipeline.
     #[arg(long, value_name = "TWIN")]
     twin: Option<PathBuf>,
-    /// The cell; that of the pipeline, if it has one only.
+    /// Name of the cell; by default the only cell of the pipeline.
     #[arg(long, value_name = "NAME")]
     cell: Option<String>,
-    /// The arm, for example its serial number: it keeps its history when it moves to another cell. The cell's name if
-    /// nothing else is given.
+    /// The arm, for example its serial number, by which it keeps its history when it moves to another cell. By
+    /// default the cell's name.
     #[arg(long, value_name = "ID")]
     arm: Option<String>,
     /// Unit of the measured effort, without a pipeline file.
@@ -61,7 +61,7 @@ pub struct Args {
     /// Topic of temperatures (`sensor_msgs/Temperature`): of the joint that the frame names, or of all.
     #[arg(long, value_name = "TOPIC")]
     temperature_topic: Option<String>,
-    /// How much of a folder is measured: so many hours before its newest recording.
+    /// For a folder: length of the measured period, up to its newest recording [h].
     #[arg(long, value_name = "HOURS", default_value_t = 24.0)]
     hours: f64,
     #[command(flatten)]
@@ -71,7 +71,7 @@ pub struct Args {
     json: bool,
 }
 
-/// Measures.
+/// Measures the arm and writes the table.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let Choice {
         recordings,
@@ -101,7 +101,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     Ok(Exit::from_loss(lost > 0))
 }
 
-/// What is measured, and the cell's name.
+/// Returns the request to measure, and the cell's name.
 fn request(args: &Args, recordings: &[PathBuf]) -> Result<(Request, String), Failure> {
     let loaded = args
         .pipeline
@@ -156,7 +156,7 @@ fn request(args: &Args, recordings: &[PathBuf]) -> Result<(Request, String), Fai
         Settings::Twin { config, .. } => config.model.clone(),
         _ => None,
     });
-    // As `run` and `replay` do, from where the file stands.
+    // Relative to the pipeline file, as in `run` and `replay`.
     let folder = pipeline.path.parent().unwrap_or(Path::new(""));
     let model = model.map(|path| folder.join(path));
     let twin = args.twin.clone().or_else(|| model.into_iter().next());

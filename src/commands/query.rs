@@ -6,7 +6,7 @@ use crate::exit::{Exit, Failure};
 use crate::output::Output;
 use crate::program_beside::{self, Program};
 
-/// What answers. Its own `--help` is the same, where it is built.
+/// The program behind the command. Its own `--help`, once it is built, is the same.
 const PROGRAM: Program = Program {
     name: "tauscope-query",
     help: "\
@@ -28,16 +28,16 @@ Tables: `recordings` and `joints` of the archives; `replays`, `residuals`, `even
 results. `replay('pipeline.yaml', 'archive/*.mcap')` replays recordings as the query asks.",
 };
 
-/// Ask in SQL what is in archives and results: `tauscope query --help` (docs/query.md).
+/// Query archives and results in SQL: `tauscope query --help` (docs/query.md).
 #[derive(Debug, clap::Args)]
 #[command(disable_help_flag = true)]
 pub struct Args {
-    /// A query, and the archives and results it is about.
+    /// A query, and the archives and results to search.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<OsString>,
 }
 
-/// Asks.
+/// Runs the query.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     program_beside::run(PROGRAM, &args.arguments, out)
 }

@@ -11,23 +11,23 @@ use tauscope_archive::{
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
 
-/// Rebuild an archive whose writer died, or whose end was cut off: all that can be read of it, with
-/// a sound index, in a new file. Several pieces become one file, a folder becomes a bag.
+/// Rebuild an archive whose writer died, or whose end was cut off: all that can be read of it, with a complete index,
+/// in a new file. Several pieces become one file, a folder becomes a bag.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The MCAP file, also one that ends in `.part`; several, which are joined in the order of their
     /// times; or a folder of them.
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
-    /// The new file or folder; by default `<name>.repaired.mcap` or `<folder>.repaired` beside it.
+    /// The new file or folder; by default `<name>.repaired.mcap` or `<folder>.repaired` next to the original.
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
-    /// Machine-readable.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Rebuilds it.
+/// Rebuilds the archive.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     match &args.recordings[..] {
         [folder] if folder.is_dir() => of_folder(args, folder, out),
@@ -103,7 +103,7 @@ fn as_json(repaired: &Repaired) -> serde_json::Value {
     })
 }
 
-/// The file, what it was made from where that does not go without saying, and what is lost.
+/// Describes a repaired file: its size, its sources if `told`, and the damage.
 fn in_words(repaired: &Repaired, told: bool) -> Vec<String> {
     let written = &repaired.written;
     let mut line = format!("{}: {} messages", written.path.display(), written.messages);

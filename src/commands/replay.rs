@@ -24,16 +24,16 @@ use crate::output::Output;
 use crate::progress::{Progress, Quiet, Show};
 use table::table;
 
-/// Run a pipeline's stages over recordings, in process, as fast as the machine allows: the same bytes
-/// every time. The recordings take the place of the pipeline's own source.
+/// Run a pipeline's stages over recordings, in process, as fast as the machine allows and with the same bytes every
+/// time. The recordings replace the pipeline's own source.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Args {
-    /// MCAP files, rosbag2 folders, `.db3` bags, ROS 1 bags, tables (`.csv`), or LeRobot data sets (`DATASET` for all of its
-    /// episodes, `DATASET/episode_000003` for one).
+    /// MCAP files, rosbag2 folders, `.db3` bags, ROS 1 bags, tables (`.csv`), or LeRobot data sets (`DATASET` for all
+    /// of its episodes, `DATASET/episode_000003` for one).
     #[arg(required_unless_present = "manifest", conflicts_with = "manifest")]
     recordings: Vec<PathBuf>,
-    /// Instead of recordings: a file of `tauscope manifest`. Each of its recordings becomes one Parquet file in --out, named
-    /// by the hash of all that it depends on. What is there is not done again.
+    /// Instead of recordings: a file of `tauscope manifest`. Each of its recordings becomes one Parquet file in
+    /// --out, named by the hash of all that it depends on. Existing results are not computed again.
     #[arg(long, value_name = "FILE", requires = "out", conflicts_with_all = ["force", "source"])]
     manifest: Option<PathBuf>,
     /// The part of the manifest to work on: 0/16 to 15/16.
@@ -46,30 +46,30 @@ pub struct Args {
     #[arg(long, default_value = "pipeline.yaml")]
     pipeline: PathBuf,
     /// Folder for the results: an archive (and picture) per recording as the pipeline's recorder says,
-    /// `summary.parquet` and `events.parquet` over all. Without it nothing is written. With --manifest, a folder or its
-    /// URL: `cell=CELL/day=DAY/HASH.parquet` (docs/results.md).
+    /// `summary.parquet` and `events.parquet` over all. Without it nothing is written. With --manifest, a folder or
+    /// its URL: `cell=CELL/day=DAY/HASH.parquet` (docs/results.md).
     #[arg(long)]
     out: Option<PathBuf>,
-    /// How many recordings are worked on at once.
+    /// Number of recordings replayed in parallel.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     jobs: u16,
-    /// The stage whose place the recordings take, where the pipeline has several sources.
+    /// The stage that the recordings replace, if the pipeline has several sources.
     #[arg(long)]
     source: Option<String>,
-    /// For archives that already hold a twin's effort: compute it anew, or keep it.
+    /// For archives that already contain a twin's effort: recompute or keep it.
     #[arg(long, value_enum, default_value_t)]
     twin: TwinChoice,
     #[command(flatten)]
     force: Force,
     #[command(flatten)]
     quiet: Quiet,
-    /// Machine-readable.
+    /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Every recording must be one before the first is replayed: results of some would be mistaken for all. What the columns
-/// of a table are may stand in the pipeline file, so whoever reads the table checks it.
+/// Checks all recordings before the first is replayed: results of some could be mistaken for results of all. Tables
+/// are checked when they are read, because the pipeline file may declare their columns.
 fn check_recordings(args: &Args) -> Result<(), Report> {
     let mut report = Report::default();
     let mut said = BTreeSet::new();
@@ -78,7 +78,7 @@ fn check_recordings(args: &Args) -> Result<(), Report> {
         let comparable = tauscope_session::open(path).and_then(|it| it.check_comparable(&[]));
         if let Err(error) = comparable {
             let title = error.to_string();
-            // What a data set lacks, all of its episodes lack.
+            // All episodes of a data set have the same fault: report it once.
             if said.insert(title.clone()) {
                 report.push(Problem::new(title));
             }
@@ -87,7 +87,7 @@ fn check_recordings(args: &Args) -> Result<(), Report> {
     report.into_result(())
 }
 
-/// Replays them.
+/// Replays the recordings.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let recordings = recordings::expand(&args.recordings)?;
     let args = Args {
@@ -97,7 +97,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     of_each(&args, out)
 }
 
-/// Replays recordings, none of which is a data set of several.
+/// Replays recordings; data sets have been expanded into episodes.
 fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let pipeline = Pipeline::load_to_replay(&args.pipeline)?;
     check_names(args)?;
@@ -173,7 +173,7 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         .and(failed.unwrap_or(Exit::Done)))
 }
 
-/// Makes the folder of the results, if nothing in it would be replaced that may not.
+/// Creates the folder for the results, unless a file that must be kept would be replaced.
 fn make_folder(replay: &Replay, args: &Args, folder: &Path) -> Result<(), Failure> {
     let of = |recording| replay.files(recording, folder);
     let tables = ["summary.parquet", "events.parquet"].map(|name| folder.join(name));
@@ -195,7 +195,8 @@ fn make_folder(replay: &Replay, args: &Args, folder: &Path) -> Result<(), Failur
         .map_err(|error| Failure::rejected(format!("cannot make {}: {error}", folder.display())))
 }
 
-/// Tells what is wrong with recordings: as a refusal if nothing came of any, else beside the results of the others.
+/// Reports recordings that were rejected: as a failure if there are no `others`, else as errors in addition to their
+/// results.
 fn tell_refused(
     wrong: Vec<(&PathBuf, String)>,
     others: bool,
@@ -225,7 +226,7 @@ fn how_far(args: &Args, done: usize) -> String {
     format!("after {done} of {all} recordings; {kept}")
 }
 
-/// Results are named after their recordings, so two of one name would overwrite each other.
+/// Rejects recordings of the same name: their results would overwrite each other.
 fn check_names(args: &Args) -> Result<(), Report> {
     let mut report = Report::default();
     for (index, recording) in args.recordings.iter().enumerate() {
@@ -245,7 +246,7 @@ fn check_names(args: &Args) -> Result<(), Report> {
     report.into_result(())
 }
 
-/// The result of each recording, in their order, whatever the number of jobs.
+/// Replays the recordings; returns their results in order, whatever the number of jobs.
 fn replay_all(replay: &Replay<'_>, args: &Args, show: Show) -> Vec<Result<Outcome, ReplayError>> {
     let progress = Progress::new(args.recordings.len(), show);
     let recordings = args.recordings.iter().enumerate().collect();
@@ -262,7 +263,7 @@ fn replay_all(replay: &Replay<'_>, args: &Args, show: Show) -> Vec<Result<Outcom
     })
 }
 
-/// What is told of a recording.
+/// Summary of a recording, as printed with `--json`.
 #[derive(Debug, Serialize)]
 struct Summary<'a> {
     recording: &'a str,

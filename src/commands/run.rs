@@ -16,23 +16,22 @@ use crate::output::Output;
 use crate::plan;
 use crate::supervisor::{self, Care, Summary, Verbosity};
 
-/// Run a pipeline: check the file, start this host's stages, look after them until the source ends
-/// or Ctrl-C.
+/// Run a pipeline: check the file, start this host's stages, and supervise them until the source ends or Ctrl-C.
 #[derive(Debug, Default, clap::Args)]
 pub struct Args {
     /// The pipeline file; by default `pipeline.yaml`.
     #[arg(conflicts_with = "pipeline")]
     file: Option<PathBuf>,
-    /// The same, as `replay` takes it.
+    /// The pipeline file, as an option like that of `replay`.
     #[arg(long, value_name = "FILE")]
     pipeline: Option<PathBuf>,
-    /// Which of the file's hosts this is, where it names several.
+    /// Name of this host in the file, if the file has several.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
-    /// Let recorders replace files that have the names of theirs.
+    /// Let recorders replace existing files.
     #[arg(long)]
     force: bool,
-    /// Fail if a source gives no usable sample within this time, from the start or since the last one.
+    /// Fail if a source emits no usable sample within this time, from the start or since the last one.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     expect_data: Option<Duration>,
     #[command(flatten)]
@@ -42,13 +41,13 @@ pub struct Args {
     json: bool,
 }
 
-/// How much is told.
+/// Verbosity options.
 #[derive(Debug, Default, clap::Args)]
 struct Telling {
-    /// Say only what must not be missed: warnings, errors, and the summary at the end.
+    /// Print only warnings, errors and the summary at the end.
     #[arg(short, long, conflicts_with = "verbose")]
     quiet: bool,
-    /// Say more: each step of the start, and every other second how it goes.
+    /// Print more: each step of the start, and a status line every 2 s.
     #[arg(short, long)]
     verbose: bool,
 }
@@ -70,7 +69,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
     }
 }
 
-/// Runs it.
+/// Runs the pipeline and prints the summary.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let mut pipeline = Pipeline::load(
         super::pipeline_file(args.file.as_ref(), args.pipeline.as_ref()),
@@ -125,7 +124,7 @@ fn replace_files(pipeline: &mut Pipeline) {
     }
 }
 
-/// Refuses to start where a recorder on `host` would have to replace a file.
+/// Fails if a recorder on `host` would have to replace a file.
 fn keep_files(pipeline: &Pipeline, host: Option<&str>) -> Result<(), Failure> {
     let mut report = Report::default();
     let here = |stage: &&Stage| host.is_none() || stage.host.as_deref() == host;
@@ -147,7 +146,7 @@ fn keep_files(pipeline: &Pipeline, host: Option<&str>) -> Result<(), Failure> {
     Ok(report.into_result(())?)
 }
 
-/// What this host's recorders have completed, and how to open it.
+/// Lists the files that this host's recorders have completed, and how to view them.
 fn written(summary: &Summary) -> String {
     let mut lines = Vec::new();
     for stage in summary.stages.iter().filter(|stage| !stage.failed) {

@@ -13,21 +13,21 @@ use tauscope_pipeline::yaml;
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
 
-/// How long the pipeline has to answer. A command that no sample takes is refused within 1 s.
+/// Timeout of the answer. The pipeline itself refuses a command after 1 s if no sample takes it.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Tell a running pipeline something: acknowledge an alarm, mute it, name the payload, label the archive.
+/// Send a command to a running pipeline: acknowledge an alarm, mute alarms, set the payload, label the archive.
 ///
-/// The answer is the stamp of the first sample for which it holds, or the reason why it does not.
+/// The answer is the stamp of the first sample to which the command applies, or the reason for a refusal.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// What to tell it.
+    /// The command.
     #[command(subcommand)]
     verb: Verb,
-    /// The cell that is meant, where the pipeline has several.
+    /// The cell, if the pipeline has several.
     #[arg(long, global = true, value_name = "NAME")]
     cell: Option<String>,
-    /// The pipeline file, which says where its source takes commands.
+    /// The pipeline file, which has the endpoint for commands to its source.
     #[arg(
         long,
         global = true,
@@ -35,7 +35,7 @@ pub struct Args {
         default_value = "pipeline.yaml"
     )]
     pipeline: PathBuf,
-    /// Where to reach it instead, e.g. tcp/10.0.0.1:7448; then `--cell` is needed, and no file.
+    /// Endpoint of the source, e.g. tcp/10.0.0.1:7448, in place of a pipeline file; requires `--cell`.
     #[arg(long, global = true, value_name = "ENDPOINT", requires = "cell")]
     connect: Option<String>,
     /// Print the answer as JSON.
@@ -43,18 +43,18 @@ pub struct Args {
     json: bool,
 }
 
-/// What to tell a pipeline.
+/// A command to a pipeline.
 #[derive(Debug, clap::Subcommand)]
 enum Verb {
-    /// Somebody has seen the alarm: a latched collision is released once it has ended.
+    /// Acknowledge the alarm: a latched collision is released once it has ended.
     Acknowledge,
-    /// Alarms raise no stop for so long, at most 60 s; 0 ends that at once.
+    /// Keep alarms from raising a stop for this time, at most 60 s; 0 ends the mute.
     Mute {
-        /// From the sample that takes the command [s].
+        /// Duration, from the sample that takes the command [s].
         #[arg(allow_negative_numbers = true)]
         seconds: f64,
     },
-    /// The tool that is attached from now on, as a point mass.
+    /// Set the payload from now on, as a point mass.
     Payload {
         /// Mass [kg]; 0 for none.
         #[arg(allow_negative_numbers = true)]
@@ -63,11 +63,11 @@ enum Verb {
         #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
         com: Option<Vec<f64>>,
     },
-    /// Detectors that learn while they run begin to learn anew.
+    /// Restart the learning of detectors that learn while they run.
     Learn,
-    /// A note in the archive.
+    /// Write a note into the archive.
     Label {
-        /// At most 48 bytes.
+        /// Text of the note, at most 48 bytes.
         #[arg(required = true)]
         text: Vec<String>,
     },
@@ -130,7 +130,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     }
 }
 
-/// The cell, and where its source takes commands, out of the pipeline file.
+/// Returns the cell, and the endpoint for commands to its source, from the pipeline file.
 fn meeting_point(args: &Args) -> Result<(String, ZenohEndpoints), Failure> {
     let file = yaml::load::<PipelineFile>(&args.pipeline)?.value;
     let names = || file.cells.keys().map(String::as_str);

@@ -18,12 +18,12 @@ use crate::interrupt;
 use crate::output::Output;
 use crate::progress::{Progress, Quiet};
 
-/// Make recordings of a simulated cell, with the physics and the contacts that a scenario chooses.
+/// Simulate recordings of a cell, with the physics and the contacts that a scenario specifies.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The scenario file.
     scenario: PathBuf,
-    /// The folder the recordings go to, with `labels.json`; for a scenario with test recordings also the URDF and
+    /// The folder for the recordings and `labels.json`; for a scenario with test recordings also the URDF and
     /// `set.yaml` to evaluate; for one that conceals the URDF, `case.yaml` to explain, and the answer in
     /// `concealed.json`.
     #[arg(long, value_name = "DIR")]
@@ -32,19 +32,19 @@ pub struct Args {
     force: Force,
     #[command(flatten)]
     quiet: Quiet,
-    /// Machine-readable.
+    /// Print the names of the files as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Makes them.
+/// Simulates the recordings and writes them.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let facts = ScenarioFacts::load(&args.scenario)?;
     let inputs = [&args.scenario, &facts.scenario.robot];
     args.force
         .check_beside(results(&facts, &args.out), inputs)?;
     let robot = facts.robot().context("cannot use the URDF")?;
-    // What is concealed cannot be had from the recordings.
+    // The metadata of a recording must not reveal the concealed physics.
     let mut told = facts.scenario.clone();
     told.conceal = None;
     let scenario = serde_json::to_string(&told).context("cannot encode the scenario")?;
@@ -115,7 +115,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// The files that it may write. A URDF that is there and the same is not replaced, but left.
+/// Returns the files that the command may write. An existing URDF with the same content is kept.
 fn results(facts: &ScenarioFacts, out: &Path) -> Vec<PathBuf> {
     let recordings = facts.scenario.recordings.iter();
     let recordings = recordings.map(|recording| format!("{}.mcap", recording.name));
@@ -131,7 +131,7 @@ fn results(facts: &ScenarioFacts, out: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// How many recordings are whole after this share of all their time.
+/// Describes how many recordings are complete once `share` of their total duration has been simulated.
 fn how_far(args: &Args, scenario: &Scenario, share: f64) -> String {
     const ROUNDING: f64 = 1e-9;
     let lengths_s = || scenario.recordings.iter().map(|each| each.duration_s);

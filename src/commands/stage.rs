@@ -20,11 +20,11 @@ use tauscope_pipeline::settings::Settings;
 use crate::announce::{self, Announced};
 use crate::supervisor::Instructions;
 
-/// Stages of ours: their seats stand on standard input.
+/// Built-in stages; their seats are read from standard input.
 #[derive(Debug, clap::Args)]
 pub struct StageArgs {}
 
-/// A program that is not ours, which ends when the supervisor does.
+/// An external program, which ends with the supervisor.
 #[derive(Debug, clap::Args)]
 pub struct ExecArgs {
     /// The program and its arguments.
@@ -32,7 +32,7 @@ pub struct ExecArgs {
     command: Vec<std::ffi::OsString>,
 }
 
-/// Why a stage cannot be made from its seat.
+/// Reason why a stage cannot be created from its seat.
 #[derive(Debug, thiserror::Error)]
 enum SeatError {
     #[error("the seat holds no stage of ours: {0}")]
@@ -57,14 +57,14 @@ enum SeatError {
     Commands(#[from] tauscope_bus::LinkError),
 }
 
-/// Takes the seats and runs their stages to their end.
+/// Reads the seats and runs their stages to their end.
 pub fn run(_args: &StageArgs) -> ExitCode {
     crew(make)
 }
 
-/// Makes the stages of one tree.
+/// Creates the stages of one group.
 fn make(seats: &[Seat]) -> Result<Vec<Member>, Unmade> {
-    // By the twin they are behind: detectors that are given the same samples, one after the other.
+    // By their twin: detectors that receive the same samples, one after the other.
     let mut shared: BTreeMap<&str, tauscope_detect::Shared> = BTreeMap::new();
     let mut members = Vec::new();
     for seat in seats {
@@ -76,12 +76,12 @@ fn make(seats: &[Seat]) -> Result<Vec<Member>, Unmade> {
     Ok(members)
 }
 
-/// Becomes the program, once its end is tied to the supervisor's.
+/// Replaces this process by the program, after tying its life to the supervisor's.
 pub fn exec(args: &ExecArgs) -> ExitCode {
     let Some((program, arguments)) = args.command.split_first() else {
         return ExitCode::FAILURE;
     };
-    // Survives the exec. Where it fails, the program still sees its standard input end.
+    // The setting survives the exec. If it fails, the program can still notice the end of its standard input.
     if let Err(error) = set_parent_process_death_signal(Some(Signal::TERM)) {
         eprintln!("warning: may outlive the supervisor: {error}");
     }
@@ -90,7 +90,7 @@ pub fn exec(args: &ExecArgs) -> ExitCode {
     ExitCode::FAILURE
 }
 
-/// Says that a stage which is started again and keeps nothing begins to learn anew.
+/// Reports that a restarted stage has lost what it had learnt, if no state was saved.
 fn tell_what_is_lost(seat: &Seat, kept: Option<&Path>) {
     if seat.restarts > 0 && kept.is_none_or(|path| !path.exists()) {
         let how = match kept {

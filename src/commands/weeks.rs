@@ -16,12 +16,12 @@ use crate::output::Output;
 
 const NS_A_DAY: i64 = 86_400_000_000_000;
 
-/// Say what has changed in the arms over weeks, from the tables of `tauscope physics`.
+/// Report changes of the arms over weeks, from the tables of `tauscope physics`.
 ///
-/// Without --out: a line for each finding. Of a hundred cells in which nothing changes, one is told of in about ten years.
+/// Without --out: a line for each finding. A hundred unchanged cells cause one false finding in about ten years.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder of all cells' tables.
+    /// The folder with the tables of all cells.
     history: PathBuf,
     /// Only this cell. May be repeated.
     #[arg(long, value_name = "NAME")]
@@ -29,7 +29,7 @@ pub struct Args {
     /// Write a page for each cell here: `CELL.html`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// The store of the fleet host, whose maintenance notes begin new baselines.
+    /// The store of the fleet host, whose maintenance notes start new baselines.
     #[arg(long, value_name = "FILE")]
     store: Option<PathBuf>,
     #[command(flatten)]
@@ -39,7 +39,7 @@ pub struct Args {
     json: bool,
 }
 
-/// Says it.
+/// Reads the tables and reports the changes.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let notes = notes(args)?;
     let of_cell = |cell: &str| notes.get(cell).map_or(&[][..], Vec::as_slice);
@@ -79,7 +79,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     Ok(Exit::from_loss(!unread.is_empty()))
 }
 
-/// The maintenance notes of all cells, newest first.
+/// Returns the maintenance notes of all cells, newest first.
 fn notes(args: &Args) -> Result<BTreeMap<String, Vec<Note>>, Failure> {
     let Some(path) = &args.store else {
         return Ok(BTreeMap::new());

@@ -1,10 +1,10 @@
-//! How long a certificate holds, and whether a private key can be used.
+//! Validity of certificates and usability of private keys.
 
 use std::path::Path;
 
 use x509_parser::pem::Pem;
 
-/// Whether a file holds a private key that can be used, or why not.
+/// Checks that a file holds a private key in PEM form.
 pub(super) fn usable_key(path: &Path) -> Result<(), String> {
     let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
     let mut blocks = Pem::iter_from_buffer(&bytes).filter_map(Result::ok);
@@ -15,7 +15,8 @@ pub(super) fn usable_key(path: &Path) -> Result<(), String> {
     }
 }
 
-/// From when to when it holds \[s since the epoch\]: of several in one file, the time that all do.
+/// Returns start and end of the validity of a file's certificates \[s since the epoch\]; of several, that of their
+/// common period.
 pub(super) fn validity(path: &Path) -> Result<(i64, i64), String> {
     let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
     let mut valid: Option<(i64, i64)> = None;

@@ -5,11 +5,11 @@ use std::net::{TcpListener, TcpStream, ToSocketAddrs};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// How long is waited for one that does not answer.
-/// Resolution: how long the command may take.
+/// Timeout of a connection.
+/// Resolution: acceptable duration of the command.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// The part that names host and port, if the transport has such.
+/// Returns host and port of an endpoint, if its transport has them.
 pub(super) fn address(endpoint: &str) -> Option<&str> {
     let (transport, rest) = endpoint.split_once('/')?;
     let over_tcp = matches!(transport, "tcp" | "tls" | "ws");
@@ -17,17 +17,17 @@ pub(super) fn address(endpoint: &str) -> Option<&str> {
     over_tcp.then_some(&rest[..end])
 }
 
-/// The certificates in an endpoint's settings.
+/// Returns the certificates in an endpoint's settings.
 pub(super) fn certificates(endpoint: &str) -> Vec<PathBuf> {
     files(endpoint, "certificate")
 }
 
-/// The private keys in an endpoint's settings.
+/// Returns the private keys in an endpoint's settings.
 pub(super) fn private_keys(endpoint: &str) -> Vec<PathBuf> {
     files(endpoint, "private_key")
 }
 
-/// What the settings whose names end in `kind` name, `_file` or not.
+/// Returns the paths in the settings whose names end in `kind`, with or without `_file`.
 fn files(endpoint: &str, kind: &str) -> Vec<PathBuf> {
     let settings = endpoint
         .split_once('#')
@@ -37,12 +37,12 @@ fn files(endpoint: &str, kind: &str) -> Vec<PathBuf> {
     files.map(|(_, path)| PathBuf::from(path)).collect()
 }
 
-/// Whether it could be listened on now.
+/// Checks that an address can be listened on.
 pub(super) fn is_free(address: &str) -> io::Result<()> {
     TcpListener::bind(address).map(drop)
 }
 
-/// Whether somebody listens there.
+/// Checks that a connection to an address is accepted.
 pub(super) fn answers(address: &str) -> io::Result<()> {
     let mut last = io::Error::from(io::ErrorKind::AddrNotAvailable);
     for address in address.to_socket_addrs()? {
@@ -60,7 +60,7 @@ mod tests {
 
     #[test]
     fn an_endpoint_names_an_address_and_certificates() {
-        // Inline certificates have a key without `_file`; a path under either is looked at.
+        // A key without `_file` is for an inline certificate; a path under either key is checked.
         let endpoint = "tls/cell:7447?prio=1#root_ca_certificate_file=ca.pem;connect_private_key_file=k.pem;\
                         connect_certificate=own.pem";
         assert_eq!(address(endpoint), Some("cell:7447"));

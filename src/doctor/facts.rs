@@ -1,4 +1,4 @@
-//! What is read of the machine.
+//! Facts about the machine.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -13,83 +13,83 @@ use tauscope_pipeline::settings::Settings;
 
 use super::{certificate, endpoint};
 
-/// Where shared memory lies.
+/// Mount point of the shared memory.
 pub const SHARED_MEMORY: &str = "/dev/shm";
 
-/// From when to when a certificate holds \[s since the epoch\], or why that cannot be told.
+/// Start and end of a certificate's validity \[s since the epoch\], or why it cannot be read.
 pub type Validity = Result<(i64, i64), String>;
 
-/// What was read; in words why not, where it could not be.
+/// Facts about the machine; an error text in place of one that cannot be read.
 #[derive(Debug, Clone, Default)]
 pub struct Facts {
-    /// Free bytes of the shared memory.
+    /// Free shared memory \[bytes\].
     pub shared_memory: Option<Result<u64, String>>,
-    /// Killed runs that left something.
+    /// Number of killed runs that left files behind.
     pub left_behind: Option<Result<usize, String>>,
-    /// What the kernel takes the time from.
+    /// Clock source of the kernel.
     pub clock_source: Option<String>,
-    /// Whether something keeps the clock with that of others.
+    /// Whether the clock is synchronised with a time server.
     pub clock_synchronised: Option<bool>,
-    /// By how much the clock may be wrong at most \[s\], as chrony says.
+    /// Upper bound on the error of the clock, from chrony \[s\].
     pub clock_error_s: Option<f64>,
-    /// Files a process may have open; `None` for any number.
+    /// Limit on the open files of a process; `None` if there is no limit.
     pub open_files: Option<u64>,
-    /// Memory a process may lock \[bytes\]; `None` for all.
+    /// Limit on the locked memory of a process \[bytes\]; `None` if there is no limit.
     pub locked_bytes: Option<u64>,
     /// Folders that recorders write to.
     pub folders: Vec<Folder>,
     /// Endpoints that stages listen on or connect to.
     pub endpoints: Vec<Endpoint>,
-    /// Certificates, with the time they hold from and to \[s since the epoch\].
+    /// Certificates, with their validity.
     pub certificates: Vec<(PathBuf, Validity)>,
-    /// Private keys, and whether they can be used.
+    /// Private keys, and whether they are usable.
     pub private_keys: Vec<(PathBuf, Result<(), String>)>,
-    /// Now \[s since the epoch\].
+    /// Current time \[s since the epoch\].
     pub now_s: i64,
-    /// The kernel's version.
+    /// Version of the kernel.
     pub kernel: String,
 }
 
 /// A folder that a recorder writes to.
 #[derive(Debug, Clone)]
 pub struct Folder {
-    /// Where.
+    /// Path of the folder.
     pub path: PathBuf,
-    /// Whether files can be made there, or why not.
+    /// Whether files can be created in it, or why not.
     pub writable: Result<(), String>,
-    /// Room on its disk \[bytes\].
+    /// Free space on its disk \[bytes\].
     pub free_bytes: Option<u64>,
-    /// At how little recording pauses \[MB\].
+    /// Free space below which recording pauses \[MB\].
     pub min_free_mb: f64,
-    /// What the newest archive in it took a day \[bytes\].
+    /// Data rate of the newest archive in it \[bytes/day\].
     pub bytes_a_day: Option<f64>,
 }
 
 /// An endpoint of a stage.
 #[derive(Debug, Clone)]
 pub struct Endpoint {
-    /// The stage or host.
+    /// Name of the stage or host.
     pub of: String,
-    /// As the file has it.
+    /// The endpoint as written in the pipeline file.
     pub at: String,
-    /// What it is to the stage.
+    /// Use of the endpoint.
     pub is: Way,
-    /// Whether that is possible, or why not.
+    /// Whether this use is possible now, or why not.
     pub possible: Result<(), String>,
 }
 
-/// What an endpoint is to a stage.
+/// Use of an endpoint by a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
-    /// It is listened on there.
+    /// The stage listens on it.
     Listen,
-    /// A router or another host is connected to.
+    /// The stage connects to it: a router or another host.
     Connect,
-    /// The robot's controller is.
+    /// The stage connects to it: the robot's controller.
     Controller,
 }
 
-/// Reads the machine, and what `pipeline` needs of it on `host`.
+/// Reads the facts about the machine, and about everything that `pipeline` uses on `host`.
 pub fn read(pipeline: Option<&Pipeline>, host: Option<&str>) -> Facts {
     let now = SystemTime::now().duration_since(UNIX_EPOCH);
     let mut facts = Facts {
@@ -169,23 +169,24 @@ fn line_of(path: &str) -> Option<String> {
     Some(fs::read_to_string(path).ok()?.trim().to_owned())
 }
 
-/// What chrony's manual gives as the bound: the offset, the root dispersion and half of the root delay.
+/// Returns the bound on the clock's error by chrony's manual: the offset, the root dispersion and half of the root
+/// delay.
 fn clock_error_s() -> Option<f64> {
     let asked = Command::new("chronyc").args(["-c", "tracking"]).output();
     let said = asked.ok().filter(|asked| asked.status.success())?;
     tracked_error_s(&String::from_utf8_lossy(&said.stdout))
 }
 
-/// The bound from a line of `chronyc -c tracking`.
+/// Returns this bound from a line of `chronyc -c tracking`.
 pub(super) fn tracked_error_s(line: &str) -> Option<f64> {
     let fields: Vec<&str> = line.trim().split(',').collect();
     let number = |at: usize| fields.get(at)?.parse::<f64>().ok();
-    // Stratum 0 follows nobody.
+    // Stratum 0: not synchronised with any server.
     (number(2)? > 0.0).then_some(())?;
     Some(number(4)?.abs() + number(11)? + 0.5 * number(10)?)
 }
 
-/// As systemd says it, or the file that its client leaves; nothing where neither is there.
+/// Asks systemd whether the clock is synchronised, else looks for the file of its client; `None` if both fail.
 fn clock_synchronised() -> Option<bool> {
     let mut ask = Command::new("timedatectl");
     let asked = ask
@@ -211,7 +212,7 @@ fn folder(path: &Path, min_free_mb: f64) -> Folder {
     }
 }
 
-/// Of the newest archive that lies there.
+/// Returns the data rate of the newest archive in a folder \[bytes/day\].
 fn bytes_a_day(folder: &Path) -> Option<f64> {
     let here = if folder == Path::new("") {
         Path::new(".")
@@ -226,7 +227,7 @@ fn bytes_a_day(folder: &Path) -> Option<f64> {
     (seconds > 1.0).then(|| recording.bytes() as f64 / seconds * 86_400.0)
 }
 
-/// Adds the endpoints of a stage: its name, the endpoint, and what that is to it.
+/// Adds the endpoints of a stage, each with the stage's name and its use.
 fn endpoints_of(stage: &Stage, endpoints: &mut Vec<(String, String, Way)>) {
     let mut add = |at: &[String], is| {
         let of = |at: &String| (stage.name.clone(), at.clone(), is);

@@ -1,34 +1,34 @@
-//! What is to be thought of what was read.
+//! Verdicts on the facts about the machine.
 
 use std::path::Path;
 
 use super::facts::{Endpoint, Facts, Folder, SHARED_MEMORY, Validity, Way};
 use super::{Level, Verdict};
 
-/// Shared memory without which no run is begun \[MB\]. The bundled pipeline, whose stages keep up, touches
-/// 0.9 MB (`df /dev/shm` while it runs); more is touched where a stage lags.
-/// Resolution: a run that finds none ends with a bus error.
+/// Free shared memory below which no run starts \[MB\]. The bundled pipeline touches 0.9 MB while its stages keep up
+/// (`df /dev/shm` while it runs), and more while one lags.
+/// Resolution: a run without free shared memory ends with a bus error.
 const LEAST_SHARED_MB: f64 = 4.0;
-/// Shared memory below which a cell whose stages all lag may not run \[MB\].
-/// Resolution: what four stages lay out.
+/// Free shared memory below which a cell may fail while all of its stages lag \[MB\].
+/// Resolution: the memory that four stages reserve.
 const AMPLE_SHARED_MB: f64 = 50.0;
-/// Files that a process with a dozen streams has open at most.
-/// Resolution: the usual limit.
+/// Upper bound on the open files of a process with a dozen streams.
+/// Resolution: the common default limit.
 const LEAST_OPEN_FILES: u64 = 1024;
-/// A certificate that holds for fewer days is told of.
-/// Resolution: time to have a new one made.
+/// Remaining validity of a certificate below which a warning is given \[days\].
+/// Resolution: time to have a new one issued.
 const SOON_DAYS: i64 = 30;
-/// A disk that lasts for fewer days is told of.
+/// Remaining recording time of a disk below which a warning is given \[days\].
 /// Resolution: time to notice over a weekend.
 const FEW_DAYS: f64 = 3.0;
-/// A clock that may be wrong by more is told of \[s\]: two hosts that are wrong by as much each are told apart by less
-/// than two samples at 100 Hz.
-/// Resolution: the rate of the slowest usual robot.
+/// Error of the clock above which a warning is given \[s\]. The times of two hosts with this error differ by at most
+/// two samples at 100 Hz.
+/// Resolution: the sampling rate of the slowest common robots.
 const CLOCK_ERROR_S: f64 = 0.01;
 /// Clock sources that are slow to read.
 const SLOW_CLOCKS: [&str; 4] = ["acpi_pm", "hpet", "jiffies", "pit"];
 
-/// Judges all of it, thing by thing.
+/// Returns the verdicts of all checks.
 pub fn all(facts: &Facts) -> Vec<Verdict> {
     let mut verdicts = vec![Verdict::ok(
         "versions",
@@ -123,7 +123,7 @@ fn clock_synchronised(synchronised: Option<bool>) -> Verdict {
     }
 }
 
-/// Two hosts that keep to one time differ by no more than both are wrong.
+/// Judges the error of the clock. Two synchronised hosts differ by at most the sum of their errors.
 fn clock_offset(error_s: f64) -> Verdict {
     const CHECK: &str = "clock offset";
     let found = format!(
@@ -152,7 +152,7 @@ fn open_files(limit: Option<u64>) -> Verdict {
     }
 }
 
-/// Nothing of tauscope locks memory: only said, for whoever looks for it.
+/// Reports the limit on locked memory, for information only: tauscope locks none.
 fn locked(limit: Option<u64>) -> Verdict {
     let found = limit.map_or_else(
         || "no limit".to_owned(),
@@ -206,7 +206,7 @@ fn endpoint(endpoint: &Endpoint) -> Verdict {
         is,
         possible,
     } = endpoint;
-    // Its settings may hold what is nobody's business.
+    // The settings after `?` and `#` may contain secrets.
     let shown = at.split(['?', '#']).next().unwrap_or(at);
     match (possible, is) {
         (Ok(()), Way::Listen) => Verdict::ok("port", format!("{of}: {shown} is free")),

@@ -1,4 +1,4 @@
-//! What is to be explained: from a case file, or from arguments.
+//! Requests to explain recordings, from a case file or from arguments.
 
 mod assembly;
 
@@ -15,37 +15,38 @@ use tauscope_twin::TwinFile;
 
 use self::assembly::{Assembly, Spot};
 
-/// What is to be explained, everything named looked up; nothing but names has been read from recordings.
+/// A request to explain recordings, with all names resolved. Of the recordings, only names of topics and joints have
+/// been read.
 #[derive(Debug)]
 pub struct Request {
     /// Name of the case.
     pub case: String,
-    /// The arm; without a model where the twin is a topic and no URDF was given.
+    /// The arm; without a model if the twin is a topic and no URDF is given.
     pub cell: Cell,
-    /// Where the URDF lies.
+    /// Path of the URDF.
     pub robot_path: Option<PathBuf>,
     /// Topic of the measured joint states.
     pub state_topic: String,
-    /// That topic, unless the first recording is a table.
+    /// `state_topic`, or `None` if the first recording is a table.
     pub topic_of_messages: Option<String>,
-    /// Topic of somebody else's twin.
+    /// Topic of an external twin.
     pub twin_topic: Option<String>,
     /// A corrected twin to start from.
     pub start: Option<StartFile>,
-    /// Recordings that may be fitted.
+    /// Recordings to fit.
     pub fit: Vec<Named>,
-    /// Recordings that nothing is fitted on.
+    /// Recordings that are held out from the fit.
     pub holdout: Vec<Named>,
-    /// Effects that are left out of the library.
+    /// Effects that are excluded from the library.
     pub without: BTreeSet<String>,
-    /// What was changed in what was given, to be said.
+    /// Note on a change of the input, for the report.
     pub note: Option<String>,
-    /// How much of each recording is read \[s\].
+    /// Longest part of a recording that is read, from its start \[s\].
     pub longest_s: f64,
 }
 
 impl Request {
-    /// Recordings of a cell, beside its twin if it has one.
+    /// Creates the request for recordings of a cell, with its twin if it has one.
     ///
     /// # Errors
     /// Everything that is wrong with the files.
@@ -74,49 +75,49 @@ impl Request {
     }
 }
 
-/// A recording and the name it goes by, which no other has.
+/// A recording and its unique name.
 #[derive(Debug, Clone)]
 pub struct Named {
-    /// The file's stem; with a number behind it where others have the same.
+    /// Stem of the file, with a number appended if another recording has the same.
     pub name: String,
-    /// Where it lies.
+    /// Path of the recording.
     pub path: PathBuf,
 }
 
 /// A `twin.yaml` to start from.
 #[derive(Debug)]
 pub struct StartFile {
-    /// Where it lies.
+    /// Path of the file.
     pub path: PathBuf,
-    /// What it says.
+    /// Content of the file.
     pub file: TwinFile,
 }
 
-/// What arguments say in place of a case file.
+/// Arguments in place of a case file.
 #[derive(Debug)]
 pub struct Arguments<'a> {
     /// The URDF.
     pub robot: Option<&'a Path>,
     /// Unit of the measured effort.
     pub effort_unit: EffortUnit,
-    /// By joint \[N m/A\].
+    /// Torque constants by joint \[N m/A\].
     pub torque_constants_nm_per_a: BTreeMap<String, f64>,
     /// A corrected twin to start from.
     pub twin: Option<&'a Path>,
-    /// Topic of somebody else's twin.
+    /// Topic of an external twin.
     pub twin_topic: Option<&'a str>,
-    /// Topic of the measured joint states; without it the one that gives efforts of most joints.
+    /// Topic of the measured joint states; by default the one with efforts of most joints.
     pub state_topic: Option<&'a str>,
-    /// Recordings that may be fitted.
+    /// Recordings to fit.
     pub fit: &'a [PathBuf],
-    /// Recordings that nothing is fitted on.
+    /// Recordings that are held out from the fit.
     pub holdout: &'a [PathBuf],
 }
 
-/// The effects and faults of recordings to leave out, which must be known.
+/// Checks the names of effects and recording faults to exclude.
 ///
 /// # Errors
-/// Those that are not.
+/// The names that are unknown.
 pub fn without(effects: &[String]) -> Result<BTreeSet<String>, Report> {
     let mut report = Report::default();
     let known = || {
@@ -137,7 +138,7 @@ pub fn without(effects: &[String]) -> Result<BTreeSet<String>, Report> {
     report.into_result(effects.iter().cloned().collect())
 }
 
-/// From a case file.
+/// Creates a request from a case file.
 ///
 /// # Errors
 /// Everything that is wrong with it or with the files that it names.
@@ -186,7 +187,7 @@ pub fn from_case(path: &Path, without: BTreeSet<String>) -> Result<Request, Repo
     assembly.request(Some(case.case.clone()), without)
 }
 
-/// From arguments.
+/// Creates a request from arguments.
 ///
 /// # Errors
 /// Everything that is wrong with them or with the files that they name.

@@ -1,4 +1,4 @@
-//! What was found, as files.
+//! Files with the results of an explanation.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -24,29 +24,28 @@ const TWIN: &str = "twin.yaml";
 const ROBOT: &str = "robot.urdf";
 const ROBOT_MJCF: &str = "robot.xml";
 
-/// What was written.
+/// The files that were written.
 #[derive(Debug, Default)]
 pub struct Made {
-    /// The files, that which most readers want first.
+    /// The files, the most useful ones first.
     pub files: Vec<PathBuf>,
-    /// What could not be written, and why.
+    /// Notes on results that could not be written, with the reason.
     pub notes: Vec<String>,
 }
 
-/// Makes the folder `out`.
+/// Creates the folder `out`.
 ///
 /// # Errors
-/// If it cannot be made.
+/// If it cannot be created.
 pub fn make(out: &Path) -> Result<(), Failure> {
     whole_file::create_folder(out)
         .map_err(|error| Failure::rejected(format!("cannot make {}: {error}", out.display())))
 }
 
-/// Refuses where results would take the place of files.
+/// Fails if results would replace files.
 ///
 /// # Errors
-/// If a file of the input would be overwritten, or a result is there already and nobody said that it may be
-/// replaced.
+/// If an input would be replaced, or a result exists already and `force` is not given.
 pub fn refuse_to_replace(out: &Path, request: &Request, force: Force) -> Result<(), Failure> {
     let start = request.start.iter().map(|start| &start.path);
     let recordings = request.fit.iter().chain(&request.holdout);
@@ -55,8 +54,8 @@ pub fn refuse_to_replace(out: &Path, request: &Request, force: Force) -> Result<
     force.check_beside(results(out, request), inputs)
 }
 
-/// What an explanation may write. Motions that are worth recording next have names that only it knows; those of an
-/// explanation before count.
+/// Returns the files that an explanation may write. The names of proposed motions are not known in advance; those of
+/// an earlier explanation are included.
 fn results<'a>(out: &'a Path, request: &'a Request) -> impl Iterator<Item = PathBuf> + 'a {
     let fixed = [REPORT, PAGE, TWIN, ROBOT, ROBOT_MJCF, PICTURE];
     let recordings = request.fit.iter().chain(&request.holdout);
@@ -65,9 +64,9 @@ fn results<'a>(out: &'a Path, request: &'a Request) -> impl Iterator<Item = Path
     names.map(|name| out.join(name)).chain(motions(out))
 }
 
-/// The motions to record next that stand in the folder.
+/// Returns the files of proposed motions in the folder.
 fn motions(out: &Path) -> Vec<PathBuf> {
-    // A folder that cannot be read is found when it is made.
+    // A folder that cannot be read causes an error when it is created.
     let entries = std::fs::read_dir(out).into_iter().flatten().flatten();
     let is_motion = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -79,7 +78,7 @@ fn motions(out: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Writes everything to `out`, and into the report which prediction is where.
+/// Writes all results to `out`, and adds the names of the prediction files to the report.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -96,11 +95,12 @@ pub fn write(
         }
     }
     outcome.report.notes.splice(0..0, of_robot(request));
-    let provenance = provenance_of(request).context("what went in")?;
-    // What an explanation before has left there must not stand beside a new report.
+    let provenance = provenance_of(request).context("the hashes of the inputs")?;
+    // Remove the files of an earlier explanation: they would contradict the new report.
     let fixed = [REPORT, PAGE, TWIN, ROBOT, ROBOT_MJCF, PICTURE].map(|name| out.join(name));
     for path in fixed.into_iter().chain(motions(out)) {
-        // One that is not there need not be removed; one that cannot be is found when it is written.
+        // Errors are ignored: a missing file is fine, and a file that cannot be removed causes an error when it is
+        // written.
         let _ = std::fs::remove_file(path);
     }
     let mut made = Made::default();
@@ -164,8 +164,8 @@ pub fn write(
     Ok(made)
 }
 
-/// The recordings that were held out, and those that were fitted. Where none are given to hold out, some of those to
-/// fit were.
+/// Returns the recordings that were held out, and those that were fitted. If none were given to hold out, some of
+/// those to fit were held out.
 fn parted(request: &Request, predicted: &BTreeMap<String, String>) -> (Vec<String>, Vec<String>) {
     let (mut holdout, mut fit) = (Vec::new(), Vec::new());
     for named in request.fit.iter().chain(&request.holdout) {
@@ -179,21 +179,22 @@ fn parted(request: &Request, predicted: &BTreeMap<String, String>) -> (Vec<Strin
     (holdout, fit)
 }
 
-/// The day, as ISO 8601 writes it, in UTC.
+/// Returns the date in UTC, in ISO 8601.
 fn today() -> String {
     let now = jiff::Timestamp::now();
     now.strftime("%Y-%m-%d").to_string()
 }
 
-/// The report's content.
+/// Returns the report as JSON.
 ///
 /// # Errors
-/// None that is known.
+/// If the report cannot be encoded; no such case is known.
 pub fn json(outcome: &Outcome) -> anyhow::Result<String> {
     serde_json::to_string_pretty(&outcome.report).context("cannot encode the report")
 }
 
-/// A row per recorded row, a column per joint; no header. Rows without a prediction are `NaN`.
+/// Formats a prediction as CSV without a header: a row per recorded row, a column per joint, `NaN` in rows without a
+/// prediction.
 fn prediction(rows: &[f64], joints: usize) -> String {
     let mut text = String::with_capacity(rows.len() * 12);
     for row in rows.chunks(joints.max(1)) {
@@ -201,7 +202,7 @@ fn prediction(rows: &[f64], joints: usize) -> String {
             if index > 0 {
                 text.push(',');
             }
-            // A hundred-millionth of an A or N m is beyond what any sensor tells.
+            // 1e-8 A or N m is below the resolution of any sensor.
             text.push_str(&format!("{value:.8}"));
         }
         text.push('\n');
@@ -221,8 +222,8 @@ fn twin_text(
     Ok(serde_saphyr::to_string(&file).context("the twin")?)
 }
 
-/// A corrected robot in the format of its file, and whether it is the whole corrected twin: a URDF where all of it is bodies, a
-/// MuJoCo model if it has an element for any of it.
+/// Returns name and text of the corrected robot in the format of its file: a URDF if all corrections are of bodies, a
+/// MuJoCo model if it has an element for any of them.
 fn robot_text(
     request: &Request,
     kept: &Kept,
@@ -258,7 +259,7 @@ fn robot_text(
     }
 }
 
-/// A result as a pipeline file names it: such a file may lie anywhere, and its paths begin at its own folder.
+/// Returns the absolute path of a result, for a pipeline file in any folder: its relative paths start at that folder.
 fn pasted(out: &Path, name: &str) -> String {
     let path = out.join(name);
     std::path::absolute(&path)

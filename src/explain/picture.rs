@@ -1,4 +1,4 @@
-//! `explain.rrd`: the same as the page, for the Rerun viewer.
+//! `explain.rrd`: the content of the page, for the Rerun viewer.
 
 use tauscope_explain::report::{Finding, JointPicture, RecordingPicture, Report};
 use tauscope_record::{
@@ -7,7 +7,7 @@ use tauscope_record::{
 
 use super::read::Kept;
 
-/// What the picture shows.
+/// Returns the content of the picture.
 pub fn of(report: &Report, pictures: &[RecordingPicture], kept: &Kept) -> Explanation {
     let events = report
         .findings
@@ -23,7 +23,7 @@ pub fn of(report: &Report, pictures: &[RecordingPicture], kept: &Kept) -> Explan
     }
 }
 
-/// The robot, with the links of the joints in which something was found.
+/// Returns the robot, with the links of the joints that have findings.
 fn robot(report: &Report, kept: &Kept) -> ExplainedRobot {
     let model = &kept.model;
     let link_of = |finding: &Finding| {
@@ -59,7 +59,8 @@ fn recording(picture: &RecordingPicture) -> ExplainedRecording {
     }
 }
 
-/// Times without an end count from the start of the session: the recording is the one they fall into.
+/// Returns the event of a finding. The start of a finding without an end is relative to the start of the session; its
+/// recording is the one that contains this time.
 fn event(finding: &Finding, kept: &Kept) -> Option<ExplainedEvent> {
     let mut start_s = finding.t_start?;
     let mut recording = finding.recording.clone();

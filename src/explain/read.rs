@@ -1,4 +1,4 @@
-//! Recordings into what the engine takes.
+//! Reading of recordings into the engine's input.
 
 use std::collections::BTreeMap;
 
@@ -10,23 +10,23 @@ use tauscope_twin::JointCorrection;
 
 use super::input::{Named, Request};
 
-/// What is known of the input once the engine has taken it.
+/// Facts about the input that are needed after the engine has taken it.
 #[derive(Debug)]
 pub struct Kept {
     /// The robot as the engine sees it.
     pub model: Model,
-    /// Whether its bodies count: not where the twin is a topic.
+    /// Whether its bodies have masses; false if the twin is external.
     pub bodies: bool,
-    /// What it started from.
+    /// Twin that the explanation started from.
     pub start: Option<Start>,
-    /// By recording, when it begins \[s from the start of the session\].
+    /// Start of each recording \[s from the start of the session\].
     pub begins_s: BTreeMap<String, f64>,
-    /// Rows of data that were lost on reading.
+    /// Number of data rows lost on reading.
     pub lost: u64,
 }
 
 impl Kept {
-    /// What is to be kept of `input`.
+    /// Extracts these facts from `input`.
     pub fn of(input: &Input) -> Self {
         let recordings = || input.fit.iter().chain(&input.holdout);
         let session_ns = recordings()
@@ -47,10 +47,11 @@ impl Kept {
     }
 }
 
-/// Reads the recordings of `request`; `progress` is told the share of them that is read, and which is next.
+/// Reads the recordings of `request`; `progress` receives the fraction that is read and the name of the next
+/// recording.
 ///
 /// # Errors
-/// All recordings that cannot be used.
+/// All recordings that cannot be used, with the reasons.
 pub fn read(request: &Request, progress: &dyn Fn(f64, &str)) -> Result<Input, Report> {
     let facts = &request.cell.facts;
     let topics = RecordingTopics {
@@ -87,7 +88,7 @@ pub fn read(request: &Request, progress: &dyn Fn(f64, &str)) -> Result<Input, Re
     for reason in by_reason(&errors, request.fit.len() + request.holdout.len()) {
         report.push(Problem::new(reason));
     }
-    // Where the effort is somebody else's twin's, the robot's bodies are in it already.
+    // The effort of an external twin already includes the robot's bodies.
     let (model, bodies) = match (&request.cell.model, &request.twin_topic) {
         (Some(model), None) => (model.clone(), true),
         _ => (Model::massless(&facts.joint_names), false),
@@ -106,7 +107,7 @@ pub fn read(request: &Request, progress: &dyn Fn(f64, &str)) -> Result<Input, Re
     })
 }
 
-/// Friction, rotors and springs in the robot's file.
+/// Returns the friction, rotors and springs that the robot's file states.
 fn of_robot(request: &Request) -> Option<Start> {
     let terms = request.cell.stated_terms();
     let joints = request.cell.facts.joint_names.len();
@@ -140,7 +141,8 @@ fn start(request: &Request, report: &mut Report) -> Option<Start> {
     }
 }
 
-/// How well a file knows a joint's gain.
+/// Returns the standard deviation of a joint's gain. Without a stated one it is 0 if the gain determines the effort
+/// per N m, else infinite.
 fn gain_deviation(joint: &JointCorrection) -> f64 {
     let of_line = if joint.tells_torque() {
         0.0

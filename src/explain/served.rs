@@ -1,5 +1,5 @@
-//! Which terms of a correction hold in a pipeline. `explain` computes motions with filters that look both ways, and a
-//! pipeline cannot; a term that needs them makes the residual of a running twin larger.
+//! Selection of the terms of a correction that hold in a pipeline. `explain` computes motions with non-causal
+//! filters, which a pipeline cannot use; a term that depends on them makes the residual of a running twin larger.
 
 use std::path::PathBuf;
 
@@ -7,13 +7,13 @@ use tauscope_dynamics::terms::{self, Layer, TermSpec};
 use tauscope_pipeline::calibrate::{CalibrateError, Job};
 use tauscope_twin::TwinFile;
 
-/// A term is left out where the residual without it is smaller by this factor.
-/// Resolution: a smaller change of an RMS is no news for a threshold.
+/// Ratio of the residual without a term to that with it, below which the term is left out.
+/// Resolution: a smaller change of an RMS does not matter for a threshold.
 const SMALLER: f64 = 0.98;
 
-/// Leaves terms of `file` out that make the residual of a pipeline's twin larger on these recordings, at their joint:
-/// those of a joint that is worse than with the twin as it was, `before`, and those that change what a sensor shows.
-/// Returns a sentence for each term left out, and for each joint that stays worse.
+/// Removes terms from `file` that make the residual of a pipeline's twin larger on these recordings, at their joint.
+/// Candidates are all terms of a joint that is worse than with the previous twin, `before`, and terms that model a
+/// sensor. Returns a sentence for each removed term, and for each joint that stays worse.
 ///
 /// # Errors
 /// If a recording cannot be read, or the twin does not fit the cell.
@@ -68,14 +68,14 @@ fn less(file: &TwinFile, place: usize) -> TwinFile {
     less
 }
 
-/// Whether it changes what a sensor shows of the effort, such as a delay.
+/// Whether a term models a sensor of the effort, such as its delay.
 fn of_a_sensor(spec: &TermSpec) -> bool {
     terms::effect(&spec.effect).is_some_and(|effect| effect.layer == Layer::Record)
 }
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+    #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
     use std::collections::BTreeMap;
     use std::path::Path;

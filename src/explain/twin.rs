@@ -1,4 +1,4 @@
-//! `twin.yaml`: what was found, as a pipeline's twin loads it.
+//! `twin.yaml`: the corrected twin, in the format that a pipeline loads.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,9 +14,9 @@ use super::input::Request;
 use super::read::Kept;
 use super::served::keep_what_serves;
 
-/// The corrected twin. Its noise, and the scores that thresholds rest on, are measured with the pipeline's
-/// own twin on the fitted recordings in which nothing came and went; where there is none they are left out,
-/// as they are where that twin fails. Returns with it what is to be said of it.
+/// Returns the corrected twin, and notes on it. Its noise, and the scores from which thresholds follow, are measured
+/// with the pipeline's own twin on the fitted recordings without temporary effects. They are left out if there is no
+/// such recording, or if that twin fails.
 pub fn file(
     request: &Request,
     kept: &Kept,
@@ -84,7 +84,7 @@ pub fn file(
     }
 }
 
-/// The twin that the explanation started from.
+/// Returns the twin that the explanation started from.
 fn before(request: &Request, job: &Job<'_>) -> TwinFile {
     if let Some(start) = &request.start {
         return start.file.clone();
@@ -96,7 +96,7 @@ fn before(request: &Request, job: &Job<'_>) -> TwinFile {
     file
 }
 
-/// The fitted recordings that the corrected twin holds for from end to end.
+/// Returns the fitted recordings for which the corrected twin is valid from start to end.
 fn quiet(request: &Request, kept: &Kept, report: &Report) -> Vec<PathBuf> {
     let disturbs = |finding: &Finding, name: &str| {
         let effect = terms::effect(finding.known_as());
@@ -106,7 +106,7 @@ fn quiet(request: &Request, kept: &Kept, report: &Report) -> Vec<PathBuf> {
         let begins_s = kept.begins_s.get(name).copied();
         let begins_s = begins_s.unwrap_or(f64::NEG_INFINITY);
         if effect.is_some_and(|effect| effect.traits.in_session) {
-            // The end that is none has no interval.
+            // A bound without an interval is not the time of the change.
             let is_kept = finding.intervals_95.contains_key("t_start_s");
             let changed_s = if is_kept {
                 finding.t_start

@@ -1,4 +1,4 @@
-//! What was found, for a terminal.
+//! Results of an explanation, formatted for a terminal.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use tauscope_explain::report::{Finding, Report, Rival};
 
 use super::output::Made;
 
-/// The verdict, the findings, the proof, and where the files are.
+/// Formats the verdict, the findings, the errors on held-out recordings, and the paths of the files.
 pub fn text(report: &Report, made: &Made) -> String {
     let mut parts = vec![format!("{}: {}", report.case, report.summary)];
     if !report.findings.is_empty() {
@@ -55,7 +55,7 @@ fn findings(report: &Report) -> Table {
         "where",
         "parameters (95 % interval)",
         "explains",
-        "cannot be told from",
+        "indistinguishable from",
     ]);
     for finding in &report.findings {
         let rivals: Vec<String> = finding.equivalent_to.iter().map(rival).collect();
@@ -87,7 +87,7 @@ fn place(finding: &Finding) -> String {
     text
 }
 
-/// In the order in which the effect has them, e.g. a mass before its inertia.
+/// Formats the parameters in the order of the effect's definition, e.g. a mass before its inertia.
 fn parameters(finding: &Finding) -> String {
     let intervals = &finding.intervals_95;
     let effect = terms::effect(&finding.effect);
@@ -124,7 +124,7 @@ fn interval(name: &str, intervals: &BTreeMap<String, [f64; 2]>) -> String {
     }
 }
 
-/// Four significant digits.
+/// Formats a number with four significant digits.
 fn figure(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();

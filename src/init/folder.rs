@@ -1,4 +1,4 @@
-//! The folder of a cell: which files it has, and the pipeline file in it.
+//! The folder of a cell: its files, and the content of its pipeline file.
 
 use std::path::{Path, PathBuf};
 
@@ -13,8 +13,8 @@ use crate::existing::Force;
 use crate::exit::Failure;
 use crate::interrupt::{self, Undo};
 
-/// The folder and the names in it. Where it is not kept, what has come into it since is taken away, so that a failed
-/// or interrupted attempt can be repeated.
+/// The folder and the paths in it. Unless it is kept, files written since are removed, so that a failed or
+/// interrupted attempt can be repeated.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
@@ -22,11 +22,11 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// The folder at `path`, which is made. Files that `init` would replace are an error unless `force` allows it;
+    /// Creates the folder at `path`. Files that `init` would replace are an error unless `force` allows it;
     /// `recordings` must not be among them.
     ///
     /// # Errors
-    /// If it cannot be made, or holds a pipeline already.
+    /// If it cannot be created, or holds a pipeline already.
     pub fn prepare(path: &Path, force: Force, recordings: &[PathBuf]) -> Result<Self, Failure> {
         let mut this = Self {
             path: path.to_owned(),
@@ -55,14 +55,15 @@ impl Folder {
         Ok(this)
     }
 
-    /// All is written, and stays.
+    /// Keeps the files: all are written.
     pub fn keep(mut self) {
         if let Some(undo) = self.undo.take() {
             interrupt::keep(undo);
         }
     }
 
-    /// A path as the files of the folder name it: what is in the folder moves with it.
+    /// Returns a path for use in the files of the folder: relative if it is inside, so that the folder can be moved,
+    /// else absolute.
     pub fn seen_from(&self, path: &Path) -> String {
         let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         let (path, folder) = (absolute(path), absolute(&self.path));
@@ -70,57 +71,57 @@ impl Folder {
         inside.display().to_string()
     }
 
-    /// What `tauscope run` runs.
+    /// Path of the pipeline file.
     pub fn pipeline(&self) -> PathBuf {
         self.path.join("pipeline.yaml")
     }
 
-    /// The schema of the pipeline file, for editors.
+    /// Path of the schema of the pipeline file, for editors.
     fn schema(&self) -> PathBuf {
         self.path.join("pipeline.schema.json")
     }
 
-    /// The corrected twin.
+    /// Path of the corrected twin.
     pub fn twin(&self) -> PathBuf {
         self.path.join("twin.yaml")
     }
 
-    /// What the detector has learnt.
+    /// Path of the detector's trained settings.
     pub fn learnt(&self) -> PathBuf {
         self.path.join("learnt.yaml")
     }
 
-    /// A copy of the robot's URDF, so that the folder can be moved.
+    /// Path of a copy of the robot's URDF, so that the folder can be moved.
     pub fn robot(&self) -> PathBuf {
         self.path.join("robot.urdf")
     }
 
-    /// The recordings as a set, to evaluate detectors on once some are labelled.
+    /// Path of the set of recordings, to evaluate detectors once some are labelled.
     pub fn set(&self) -> PathBuf {
         self.path.join("set.yaml")
     }
 
-    /// The recordings that `--live` makes.
+    /// Path of the folder for the recordings of `--live`.
     pub fn recordings(&self) -> PathBuf {
         self.path.join("recordings")
     }
 
-    /// The pipeline that makes them.
+    /// Path of the pipeline file that records them.
     pub fn recorder(&self) -> PathBuf {
         self.path.join("record.yaml")
     }
 
-    /// What was found.
+    /// Path of the page of findings.
     pub fn page(&self) -> PathBuf {
         self.path.join("init.md")
     }
 
-    /// The explanation of the twin.
+    /// Path of the folder with the explanation of the twin.
     pub fn explained(&self) -> PathBuf {
         self.path.join("explained")
     }
 
-    /// Writes the set: recordings that were fitted train, those held out validate.
+    /// Writes the set: fitted recordings are for training, held-out ones for validation.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -157,8 +158,8 @@ impl Folder {
         write(&self.twin(), text.as_bytes())
     }
 
-    /// Writes the pipeline file, and its schema. It listens to the `live` source; without one it plays `recording` until
-    /// it is told to listen to the robot. `is_explained` says which twin it has.
+    /// Writes the pipeline file and its schema. The pipeline listens to the `live` source; without one it plays
+    /// `recording`, until the user connects it to the robot. `is_explained` selects the comment on its twin.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -191,13 +192,14 @@ impl Folder {
     }
 }
 
-/// Removes what is `new`, folders behind what is in them. What is not there was not written.
+/// Removes the `new` files and folders, folders after their content. Errors are ignored: some may not have been
+/// written.
 fn take_away(new: &[PathBuf], explained: &Path) {
     for path in new {
         let _ = if path == explained {
             std::fs::remove_dir_all(path)
         } else if path.is_dir() {
-            // One with recordings of `--live` in it stays.
+            // A folder with recordings of `--live` is not empty, and stays.
             std::fs::remove_dir(path)
         } else {
             std::fs::remove_file(path)
@@ -205,12 +207,12 @@ fn take_away(new: &[PathBuf], explained: &Path) {
     }
 }
 
-/// A text as YAML holds any text.
+/// Returns a text as a quoted YAML string.
 pub fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
-/// A cell's name may have letters, digits, `-` and `_`.
+/// Returns a valid cell name: letters, digits, `-` and `_` only.
 fn name(robot: &str) -> String {
     let kept = |c: char| {
         if c.is_ascii_alphanumeric() || "-_".contains(c) {
@@ -248,18 +250,18 @@ SOURCE
 
   - name: detect
     input: twin
-    # What of the residual is usual was learnt from the recordings. Fewer false alarms need larger forces.
+    # The baseline of the residual was learnt from the recordings. Fewer false alarms need larger forces.
     detect: {tauscope: {learnt: learnt.yaml, false_alarms_per_hour: 5}}
 
   - name: watch
     input: twin
-    # Says what has changed where no contact explains an alarm: a payload, friction, a scale or an offset.
+    # Reports a change of the arm if no contact explains an alarm: a payload, friction, a scale or an offset.
     explain: {}
 
   - name: record
     inputs: [ingest, twin, detect, watch]
     record:
-      # {n} is the first number that is free: nothing is replaced.
+      # {n} is the first free number: no file is replaced.
       mcap: "out/CELL-{n}.mcap"
       rerun: {file: "out/CELL-{n}.rrd"}
 "#;

@@ -1,4 +1,4 @@
-//! The detector: behind which twin, and what it has learnt.
+//! Training of the detector, and choice of the twin behind which it runs.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,37 +15,37 @@ use crate::exit::Failure;
 
 /// Canonical name of the detector.
 const DETECTOR: &str = "tauscope";
-/// The twin that a line per joint corrects.
+/// Name of the twin that a gain and an offset per joint correct.
 const REGRESSION: &str = "regression";
 
-/// A detector that has learnt, behind the twin that suits it.
+/// A trained detector, with the twin behind which it runs.
 #[derive(Debug)]
 pub struct Learnt {
     /// The twin.
     pub twin: TwinFile,
-    /// Whether it is the explained one.
+    /// Whether this is the explained twin.
     pub is_explained: bool,
-    /// What was found, a sentence each.
+    /// Findings, a sentence each.
     pub sentences: Vec<String>,
 }
 
-/// How a detector did behind a twin on recordings that neither had seen.
+/// Test of a detector behind a twin, on recordings on which neither was trained.
 #[derive(Debug)]
 struct Trial {
     /// The twin's path or name, as an evaluation takes it.
     twin: String,
-    /// Alarms, each of them false.
+    /// Number of alarms, all of them false.
     alarms: usize,
-    /// Of the recordings without contacts \[s\].
+    /// Duration of these contact-free recordings \[s\].
     seen_s: f64,
-    /// By end of the chain, the outermost link for which a force is known, and the force that is detected in half of all
-    /// directions \[N\].
+    /// For each end of the chain, the outermost link with a known force, and the force that is detected in half of
+    /// all directions \[N\].
     pushes: Vec<(String, f64)>,
 }
 
-/// Lets the detector learn from the set at `set`, behind the twin at `explained` or, with `has_line`, behind a regression, whichever
-/// gives fewer false alarms on the validation recordings or, with as many, finds the weaker push. Writes what it
-/// has learnt to `out`.
+/// Trains the detector on the set at `set`, behind the twin at `explained` or, with `has_line`, behind a regression:
+/// whichever causes fewer false alarms on the validation recordings or, with equally many, detects the weaker push.
+/// Writes the trained settings to `out`.
 ///
 /// # Errors
 /// If nothing can be learnt from these recordings.
@@ -92,7 +92,8 @@ pub fn learn(
     })
 }
 
-/// Evaluates the detector on the set; with `unseen` the validation recordings are kept from it and judged.
+/// Evaluates the detector on the set; with `unseen` the validation recordings are used for the test, not for
+/// training.
 fn evaluate(
     set: &Path,
     twins: &[String],
@@ -113,7 +114,7 @@ fn evaluate(
             }
         }
     }
-    // This detector has no weights that would go to a folder.
+    // This detector has no weight files, so it needs no folder.
     let result = tauscope_evaluate::run(request, Path::new(""), progress);
     result.map_err(|error| Failure::rejected(error.to_string()))
 }
@@ -143,7 +144,7 @@ fn trials(evaluation: &Evaluation, twins: &[String], model: Option<&Model>) -> V
     trials.collect()
 }
 
-/// The forces on links that carry no other link of the list.
+/// Returns the forces on the links that carry no other link of `forces`.
 fn at_ends(forces: &[(String, f64)], model: Option<&Model>) -> Vec<(String, f64)> {
     let carries = |link: &str, other: &str| {
         let parent = |link: usize| model.and_then(|model| model.links()[link].parent);
@@ -156,7 +157,7 @@ fn at_ends(forces: &[(String, f64)], model: Option<&Model>) -> Vec<(String, f64)
 }
 
 impl Trial {
-    /// Its twin.
+    /// Returns the name of its twin, in words.
     fn words(&self) -> &'static str {
         if self.twin == REGRESSION {
             "only a gain and an offset per joint"

@@ -1,4 +1,4 @@
-//! Recordings of the live robot, in place of those that were made before.
+//! Recordings of the live robot, in place of existing ones.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -13,24 +13,24 @@ use crate::output::Output;
 use crate::plan;
 use crate::supervisor::{self, Care, Verbosity};
 
-/// Recordings that are made: one in four is held out, as where somebody gives five.
+/// Number of recordings that are made. One in four is held out, as when the user gives five.
 const RECORDINGS: f64 = 5.0;
-/// The recorder goes on for up to so long after the time is over. The first pieces are longer by it, so that no sixth
-/// piece begins \[s\].
-/// Physical: a stage hears that it shall end within a second, also on a busy machine.
+/// Longest time for which the recorder continues after the end \[s\]. The length of a piece allows for it, so that no
+/// sixth piece begins.
+/// Physical: a stage receives the request to end within a second, even on a busy machine.
 const RUN_ON_S: f64 = 1.0;
-/// A piece shorter than this share of its due is left out: what moved in it tells nothing.
-/// Physical: an interrupted stream leaves a rest; half a piece still holds a motion.
+/// Fraction of its planned length below which a piece is left out: it holds too little motion.
+/// Physical: an interrupted stream leaves a fragment; half a piece still holds a motion.
 const LEAST_SHARE: f64 = 0.5;
-/// The shortest time that is worth it \[s\].
+/// Shortest recording time that is accepted \[s\].
 const SHORTEST_S: f64 = 10.0;
-/// Without joint states for so long the command fails; by then the source has said why.
+/// Time without joint states after which the command fails; by then the source has reported the reason.
 const EXPECT_DATA: Duration = Duration::from_secs(15);
 
-/// A live source, and for how long it is recorded.
+/// A live source, and its recording time.
 #[derive(Debug)]
 pub struct Live<'a> {
-    /// How long \[s\].
+    /// Recording time \[s\].
     pub seconds: f64,
     /// The settings of the source, as in a pipeline's `ingest`.
     pub source: &'a str,
@@ -39,10 +39,10 @@ pub struct Live<'a> {
 }
 
 impl Live<'_> {
-    /// Records, and gives the recordings. The pipeline that does it stays in the folder.
+    /// Records the robot and returns the recordings. The pipeline file of the recorder stays in the folder.
     ///
     /// # Errors
-    /// If the source's settings are wrong, nothing comes, data was lost, or somebody interrupts it.
+    /// If the source's settings are wrong, no data arrives, data is lost, or the command is interrupted.
     pub fn record(&self, folder: &Folder, out: &mut Output) -> Result<Vec<PathBuf>, Failure> {
         if self.seconds.is_nan() || self.seconds < SHORTEST_S {
             let title = format!("{} s are too short to learn from", self.seconds);
@@ -95,7 +95,7 @@ impl Live<'_> {
         }
     }
 
-    /// The recordings without rests that are too short to learn from; these stay in the folder, and are told.
+    /// Returns the recordings that are long enough to learn from; the others stay in the folder and are reported.
     fn long_enough(&self, all: Vec<PathBuf>, out: &mut Output) -> Result<Vec<PathBuf>, Failure> {
         let least_s = LEAST_SHARE * self.seconds / RECORDINGS;
         let mut kept = Vec::new();
@@ -127,14 +127,14 @@ impl Live<'_> {
             .replace("SECONDS", &format!("{:.1}", self.piece_s()))
     }
 
-    /// After how long a new piece begins \[s\].
+    /// Returns the length of a piece \[s\].
     fn piece_s(&self) -> f64 {
-        // The last piece is the shortest: it ends when the time is over.
+        // The last piece is the shortest: it ends when the recording time is over.
         (self.seconds + RUN_ON_S) / RECORDINGS
     }
 }
 
-/// The recordings in a folder; none where there is no folder.
+/// Returns the recordings in a folder; none if there is no folder.
 fn of_folder(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let paths = entries.map(|entry| entry.path());
@@ -152,7 +152,7 @@ const RECORDER: &str = r"# Written by `tauscope init --live`: records the robot,
 version: 1
 
 cells:
-  # Recorded as it comes; `init` tells the unit afterwards.
+  # Recorded in the source's unit; `init` determines it afterwards.
   arm: {robot: ROBOT, effort_unit: A}
 
 stages:

@@ -1,4 +1,4 @@
-//! The recordings before anything is fitted: read as `explain` reads them, parted into those to fit and those held out.
+//! The recordings before anything is fitted: read as by `explain`, split into those to fit and those held out.
 
 use std::path::{Path, PathBuf};
 
@@ -43,11 +43,11 @@ pub struct Told<'a> {
     pub robot: &'a Path,
     /// The recordings.
     pub recordings: &'a [PathBuf],
-    /// The topic of the joint states, where it is given.
+    /// The topic of the joint states, if given.
     pub state_topic: Option<&'a str>,
-    /// The unit of the effort, where it is given.
+    /// The unit of the effort, if given.
     pub effort_unit: Option<EffortUnit>,
-    /// Effects and faults of recordings that are left out of the explanation.
+    /// Effects and faults of recordings that are excluded from the explanation.
     pub without: &'a std::collections::BTreeSet<String>,
 }
 
@@ -55,7 +55,7 @@ impl Told<'_> {
     /// Reads the recordings, holds some of them out and chooses the unit that the explanation begins with.
     ///
     /// # Errors
-    /// If they are not those of the robot, or nothing that is learnt from one of them can be right.
+    /// If they are not recordings of the robot, or one of them has a fault that makes anything learnt from it wrong.
     pub fn look(&self, progress: &dyn Fn(f64, &str)) -> Result<Looked, Failure> {
         let [_, _, ..] = self.recordings else {
             let problem = Problem::new(
@@ -111,7 +111,7 @@ impl Told<'_> {
         })
     }
 
-    /// All recordings to be fitted, efforts in N m as long as the unit is not known.
+    /// Creates the request: all recordings are to be fitted, with efforts in N m until the unit is known.
     fn request(&self) -> Result<Request, Report> {
         let arguments = Arguments {
             robot: Some(self.robot),
@@ -126,21 +126,21 @@ impl Told<'_> {
         explain::from_arguments(&arguments, self.without.clone())
     }
 
-    /// The unit that the explanation begins with, and how it was chosen: motor current where joints that bear weight
-    /// measure far less than the weight requires, else N m. The explanation revises it.
+    /// Chooses the unit that the explanation begins with, and describes the choice: motor current if joints that bear
+    /// weight measure far less than the weight requires, else N m. The explanation revises it.
     fn unit(&self, scale: Option<&EffortScale>) -> (EffortUnit, String) {
         if let Some(unit) = self.effort_unit {
             return (unit, format!("Effort is in {}, as given.", words(unit)));
         }
         let in_nm = || {
-            let sentence = "Effort is taken to be in N m; the explanation below says if it is not.";
+            let sentence = "Effort is assumed to be in N m; the explanation below verifies this.";
             (EffortUnit::Nm, sentence.to_owned())
         };
         match scale {
             Some(EffortScale::Torque { slope, sure: true }) => (
                 EffortUnit::Nm,
                 format!(
-                    "Effort is taken to be in N m: on joints that carry weight it is {slope:.2} times what the robot's weight \
+                    "Effort is assumed to be in N m: on joints that carry weight it is {slope:.2} times what the robot's weight \
                      requires."
                 ),
             ),
@@ -162,14 +162,14 @@ impl Told<'_> {
     }
 }
 
-/// The slopes of measured over expected effort, of the joints whose motion explains most of their effort.
+/// Returns the slopes of measured over expected effort, of the joints whose motion explains most of their effort.
 fn scale(request: &Request) -> Option<EffortScale> {
     let topics = Topics {
         state: request.state_topic.clone(),
         ..Topics::default()
     };
     let mut cell = request.cell.clone();
-    // A fit in A needs no torque constants, and refuses no slope.
+    // A fit in A needs no torque constants, and rejects no slope.
     cell.facts.effort_unit = EffortUnit::A;
     let fit: Vec<PathBuf> = request.fit.iter().map(|named| named.path.clone()).collect();
     let job = Job {
@@ -192,7 +192,7 @@ fn hold_out(request: &mut Request, input: &mut Input) {
     (request.holdout, request.fit) = all.partition(is_held);
 }
 
-/// Nothing begins on recordings from which nothing right can be learnt.
+/// Rejects recordings with faults that make anything learnt from them wrong.
 fn refuse_faults(input: &Input) -> Result<(), Report> {
     let mut report = Report::default();
     let faults = |recording: &Recording| {
@@ -213,7 +213,7 @@ fn refuse_faults(input: &Input) -> Result<(), Report> {
     report.into_result(())
 }
 
-/// A sentence for each joint that follows another.
+/// Returns a sentence for each joint that follows another.
 fn coupled(cell: &Cell) -> Vec<String> {
     let model = cell.model.iter();
     let sentences = model.flat_map(|model| {
@@ -225,7 +225,7 @@ fn coupled(cell: &Cell) -> Vec<String> {
     sentences.collect()
 }
 
-/// A sentence for each joint whose limits count as none.
+/// Returns a sentence for each joint whose limits are treated as absent.
 fn unlimited(cell: &Cell) -> Vec<String> {
     let joints = cell.model.iter().flat_map(Model::joints);
     let remarks = joints.filter_map(Joint::remark);
@@ -234,7 +234,7 @@ fn unlimited(cell: &Cell) -> Vec<String> {
         .collect()
 }
 
-/// The unit in words.
+/// Returns the unit in words.
 pub fn words(unit: EffortUnit) -> &'static str {
     match unit {
         EffortUnit::Nm => "N m",

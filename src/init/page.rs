@@ -1,4 +1,4 @@
-//! What was found, on one page.
+//! The page of findings.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -26,8 +26,8 @@ pub struct Seen<'a> {
     pub is_live: bool,
 }
 
-/// The page as Markdown: the recordings, the physics that the twin leaves out, the threshold that the detector has learnt,
-/// the recordings to add, and the next commands.
+/// Returns the page as Markdown: the recordings, the physics that the twin lacks, the threshold that the detector has
+/// learnt, the recordings to add, and the next commands.
 pub fn page(folder: &Folder, seen: &Seen<'_>, report: &Report, learnt: &Learnt) -> String {
     let (lost, is_live) = (seen.lost, seen.is_live);
     let mut text = format!("# {}\n", seen.cell.facts.name);
@@ -65,12 +65,12 @@ pub fn page(folder: &Folder, seen: &Seen<'_>, report: &Report, learnt: &Learnt) 
         list(&mut text, &next);
     }
 
-    section(&mut text, "Go on", &[]);
+    section(&mut text, "Next steps", &[]);
     list(&mut text, &go_on(folder, report, learnt, is_live));
     text
 }
 
-/// What to do with the folder.
+/// Returns the next steps with the folder.
 fn go_on(folder: &Folder, report: &Report, learnt: &Learnt, is_live: bool) -> Vec<String> {
     let pipeline = for_a_shell(&folder.pipeline());
     let search = format!(
@@ -102,7 +102,7 @@ fn go_on(folder: &Folder, report: &Report, learnt: &Learnt, is_live: bool) -> Ve
     first.into_iter().chain([read]).collect()
 }
 
-/// A path as a shell takes it.
+/// Quotes a path for a shell.
 fn for_a_shell(path: &Path) -> String {
     let text = path.display().to_string();
     let is_plain = |c: char| c.is_alphanumeric() || "/._-".contains(c);
@@ -113,7 +113,7 @@ fn for_a_shell(path: &Path) -> String {
     }
 }
 
-/// The error of the held-out recordings at a joint, before and after, and its unit.
+/// The error on held-out recordings at a joint, before and after the correction, and its unit.
 struct JointError<'a> {
     joint: &'a str,
     unit: &'a str,
@@ -121,7 +121,7 @@ struct JointError<'a> {
     after: f64,
 }
 
-/// How much smaller the error of the held-out recordings got, joint by joint.
+/// Describes by joint how much the correction reduces the error on held-out recordings.
 fn proof(report: &Report, cell: &Cell) -> String {
     let slides = |joint: &String| {
         let mut joints = cell.model.iter().flat_map(Model::joints);
@@ -141,7 +141,7 @@ fn proof(report: &Report, cell: &Cell) -> String {
     told(&errors.collect::<Vec<_>>())
 }
 
-/// The unit stands once where all joints have the same.
+/// Formats the errors; a unit that all joints share appears once.
 fn told(errors: &[JointError<'_>]) -> String {
     let of_first = errors.first().map_or("", |first| first.unit);
     let is_one = errors.iter().all(|error| error.unit == of_first);
@@ -168,7 +168,7 @@ fn told(errors: &[JointError<'_>]) -> String {
     }
 }
 
-/// The first few of many sentences, and where the others are.
+/// Returns the first few sentences, and where to find the others.
 fn first(mut sentences: Vec<String>, others: &str) -> Vec<String> {
     const SHOWN: usize = 6;
     if sentences.len() > SHOWN {

@@ -1,4 +1,4 @@
-//! Which recordings a night is measured on.
+//! Choice of the recordings on which a night is measured.
 
 use std::path::{Path, PathBuf};
 
@@ -7,12 +7,13 @@ use tauscope_pipeline::report::{Problem, Report};
 
 use super::open;
 
-/// Most recordings of a night. Resolution: twelve spread over a day have its cold and its warm hours.
+/// Maximum number of recordings of a night.
+/// Resolution: twelve spread over a day include its cold and its warm hours.
 const MOST: usize = 12;
-/// A recording is measured for so long from its beginning \[s\], so that the work is bounded.
+/// Longest part of a recording that is measured, from its start, so that the work is bounded \[s\].
 /// Resolution: two minutes have several cycles of most programs.
 pub const LONGEST_S: f64 = 120.0;
-/// A pause between two recordings that is longer is a robot that was switched off \[ns\].
+/// Pause between two recordings above which the robot is assumed to have been switched off \[ns\].
 /// Resolution: a joint cools down within an hour.
 const PAUSE_NS: i64 = 3_600_000_000_000;
 
@@ -21,15 +22,16 @@ const PAUSE_NS: i64 = 3_600_000_000_000;
 pub struct Choice {
     /// The files, oldest first.
     pub recordings: Vec<PathBuf>,
-    /// Mean of how long the robot had been running at each \[h\]; `None` where files tell no start.
+    /// Time since the robot was started, averaged over the recordings \[h\]; `None` if the files do not show the
+    /// start.
     pub hours_since_start: Option<f64>,
 }
 
-/// Of the files and the files in the folders of `paths`: those whose stamps lie within the `hours` before the newest, at
-/// most twelve, evenly spread. A file that was named itself is always taken.
+/// Chooses from the files in `paths`, and from the files in its folders, at most twelve recordings whose stamps are
+/// within `hours` before the newest, evenly spread. A file that is named itself is considered whatever its stamp.
 ///
 /// # Errors
-/// Files that cannot be opened, or if nothing is left.
+/// Files that cannot be opened, or that there is no recording to measure.
 pub fn choose(paths: &[PathBuf], hours: f64) -> Result<Choice, Report> {
     let mut report = Report::default();
     let mut all: Vec<(PathBuf, i64, i64)> = Vec::new();
@@ -49,7 +51,7 @@ pub fn choose(paths: &[PathBuf], hours: f64) -> Result<Choice, Report> {
         }
         let found = in_folder(path)?;
         for file in &found {
-            // What a recorder is writing right now cannot be opened yet.
+            // Errors are ignored: a file that a recorder is writing cannot be opened yet.
             let mut aside = Report::default();
             take(file, &mut aside);
         }
@@ -58,7 +60,7 @@ pub fn choose(paths: &[PathBuf], hours: f64) -> Result<Choice, Report> {
     all.sort_by(|a, b| a.1.cmp(&b.1).then_with(|| a.0.cmp(&b.0)));
     let newest = all.last().map_or(0, |(_, begin, _)| *begin);
     let is_named = |path: &PathBuf| paths.contains(path);
-    // Begins of the runs of the robot: a recording behind a pause is the first of one.
+    // Time from the robot's start to each recording. The first recording after a pause marks a start.
     let mut since = Vec::with_capacity(all.len());
     let mut run: Option<(i64, i64)> = None;
     for (_, begin, end) in &all {
@@ -81,7 +83,7 @@ pub fn choose(paths: &[PathBuf], hours: f64) -> Result<Choice, Report> {
             .help("name MCAP files, or the folder that the recorder writes to")
             .into());
     }
-    // One recording alone does not tell since when the robot has run.
+    // A single recording does not show when the robot was started.
     let hours_since_start = (all.len() > 1)
         .then(|| chosen.iter().map(|&at| since[at]).sum::<f64>() / chosen.len() as f64);
     let recordings = chosen.into_iter().map(|at| all[at].0.clone()).collect();
@@ -91,7 +93,7 @@ pub fn choose(paths: &[PathBuf], hours: f64) -> Result<Choice, Report> {
     })
 }
 
-/// The recordings in a folder, not in those below it.
+/// Returns the recordings in a folder, without its subfolders.
 fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, Report> {
     let failed = |error: std::io::Error| Problem::of_file(folder, format!("cannot read: {error}"));
     let mut files = Vec::new();

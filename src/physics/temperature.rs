@@ -1,4 +1,4 @@
-//! The temperature of joints while they were recorded.
+//! Temperature of the joints while they were recorded.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use super::night::LONGEST_S;
 use super::open;
 use crate::exit::Failure;
 
-/// Mean temperature by joint over the measured part of some recordings \[deg C\]. A message is of the joint that its frame
-/// names, or of all joints where its frame is empty; `None` for a joint of which nothing is told.
+/// Returns the mean temperature by joint over the measured part of some recordings \[deg C\]. A message is of the
+/// joint that its frame names, or of all joints if its frame is empty; `None` for a joint without a message.
 pub fn of_joints<'a>(
     recordings: impl Iterator<Item = &'a Path>,
     topic: &str,
@@ -27,7 +27,7 @@ pub fn of_joints<'a>(
             .saturating_add((LONGEST_S * 1e9) as i64);
         let mut messages = archive.messages(&[topic]).map_err(failed)?;
         while let Some(message) = messages.next_message() {
-            // What is broken is counted where the joint states are read.
+            // Damaged messages are counted where the joint states are read.
             let Ok(message) = message else { continue };
             if message.log_time_ns > end_ns {
                 break;

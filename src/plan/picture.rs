@@ -1,5 +1,5 @@
-//! A plan as a picture, for Mermaid and for Graphviz: hosts are boxes, and so are processes of several stages. Names are letters, digits, `_` and `-`, so
-//! nothing needs escaping.
+//! A plan as a picture, for Mermaid and for Graphviz: hosts are boxes, and so are processes of several stages. Names
+//! consist of letters, digits, `_` and `-`, so nothing needs escaping.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use tauscope_pipeline::pipeline::{Pipeline, Stage, words_for};
 
 use super::{Link, Over};
 
-/// A Mermaid flowchart.
+/// Returns a Mermaid flowchart.
 pub fn mermaid(pipeline: &Pipeline, links: &[Link]) -> String {
     let mut text = "flowchart LR\n".to_owned();
     let boxes = |text: &mut String, name: Option<(String, &str)>, inner: &str| match name {
@@ -56,7 +56,7 @@ pub fn mermaid(pipeline: &Pipeline, links: &[Link]) -> String {
     text
 }
 
-/// A Graphviz digraph.
+/// Returns a Graphviz digraph.
 pub fn dot(pipeline: &Pipeline, links: &[Link]) -> String {
     let mut text = "digraph pipeline {\n  rankdir=LR;\n  node [shape=box];\n".to_owned();
     for (host, stages) in by(pipeline, 0..pipeline.stages.len(), |stage| {
@@ -107,7 +107,7 @@ pub fn dot(pipeline: &Pipeline, links: &[Link]) -> String {
     text
 }
 
-/// Stages by what `key` says of them, in the order of the pipeline.
+/// Groups stages by `key`, in the order of the pipeline.
 fn by<'a>(
     pipeline: &'a Pipeline,
     stages: impl IntoIterator<Item = usize>,

@@ -6,7 +6,7 @@ use tauscope_pipeline::pipeline::{Pipeline, words_for};
 
 use super::Link;
 
-/// Stages, hosts and links.
+/// Formats the stages, hosts and links.
 pub fn table(pipeline: &Pipeline, links: &[Link]) -> String {
     let mut parts = vec![stages(pipeline)];
     if pipeline.hosts.len() > 1 {
@@ -87,7 +87,7 @@ fn link_table(pipeline: &Pipeline, links: &[Link]) -> String {
     table.trim_fmt()
 }
 
-/// As it is written in files.
+/// Returns the keyword of an overflow policy in pipeline files.
 pub fn keep_word(keep: Keep) -> &'static str {
     match keep {
         Keep::All => "all",

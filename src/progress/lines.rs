@@ -1,37 +1,37 @@
-//! Lines that say how far a long computation is, where no bar can be drawn. Pure: the time is an argument.
+//! Progress lines of a long computation, where no bar can be drawn. Pure: the time is an argument.
 
 use std::time::Duration;
 
-/// Shorter work says nothing.
+/// Time before the first line; shorter work prints none.
 const FIRST_AFTER: Duration = Duration::from_secs(5);
-/// A new step is told, at most so often.
+/// Shortest time between a line and that of a new step.
 const STEP_AFTER: Duration = Duration::from_secs(5);
-/// A step that lasts is told again.
+/// Interval of the lines of a step that lasts.
 const AGAIN_AFTER: Duration = Duration::from_secs(30);
-/// Before that much is done nobody can say what is left.
+/// Progress below which no remaining time is estimated.
 const TELLING_FRACTION: f64 = 0.05;
 
-/// How far the work is.
+/// Progress of the work.
 #[derive(Debug)]
 pub struct Far<'a> {
-    /// What it does; empty where it does the same all the time.
+    /// Current step; empty if the work has only one.
     pub what: &'a str,
-    /// From 0 to 1.
+    /// Progress, from 0 to 1.
     pub fraction: f64,
-    /// When it came to that, from its beginning.
+    /// Time at which this progress was reached, from the start of the work.
     pub reached: Duration,
-    /// How many recordings are done, and of how many.
+    /// Numbers of completed and of all recordings.
     pub counted: Option<(usize, usize)>,
 }
 
-/// What was told.
+/// Time and step of the last line.
 #[derive(Debug, Default)]
 pub struct Lines {
     told: Option<(Duration, String)>,
 }
 
 impl Lines {
-    /// The line that is due at `now`, counted from the beginning of the work, if one is.
+    /// Returns the line that is due at `now`, measured from the start of the work, if any.
     pub fn due(&mut self, now: Duration, far: &Far<'_>) -> Option<String> {
         let due = match &self.told {
             None => FIRST_AFTER,
@@ -60,7 +60,8 @@ fn line(now: Duration, far: &Far<'_>) -> String {
     text
 }
 
-/// What is left if the rest goes as what is done, and does not take longer than that already.
+/// Extrapolates the remaining time linearly; `None` if little is done yet, or if the work takes longer than
+/// extrapolated.
 fn left(now: Duration, far: &Far<'_>) -> Option<Duration> {
     if far.fraction < TELLING_FRACTION {
         return None;
@@ -70,7 +71,7 @@ fn left(now: Duration, far: &Far<'_>) -> Option<Duration> {
     (left_s >= 1.0).then(|| Duration::from_secs_f64(left_s))
 }
 
-/// `45 s`, `12 min`, `1 h 5 min`.
+/// Formats a time as `45 s`, `12 min` or `1 h 5 min`.
 fn words(time: Duration) -> String {
     let seconds = time.as_secs_f64().round() as u64;
     match seconds {
@@ -93,7 +94,7 @@ mod tests {
         }
     }
 
-    /// The lines of work that takes so many seconds.
+    /// Returns the lines of work of this duration.
     fn lines<'a>(seconds: u64, at: impl Fn(u64) -> Far<'a>) -> Vec<String> {
         let mut lines = Lines::default();
         let all = (0..=seconds).filter_map(|s| lines.due(Duration::from_secs(s), &at(s)));
@@ -127,7 +128,7 @@ mod tests {
             said(120, &far("x", 0.1, 60)),
             "2 min: 10 %, about 8 min left; x"
         );
-        // It takes longer than it should.
+        // The work takes longer than extrapolated.
         assert_eq!(said(900, &far("x", 0.1, 60)), "15 min: 10 %; x");
         let several = Far {
             counted: Some((3, 20)),

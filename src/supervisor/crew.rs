@@ -1,4 +1,4 @@
-//! One process of this host and the stages that run in it, through all its lives.
+//! A worker: one process of this host and the stages that run in it, over all incarnations.
 
 use tauscope_bus::Seat;
 use tokio::time::Instant;
@@ -6,24 +6,24 @@ use tokio::time::Instant;
 use super::patience::{Overdue, Patience};
 use super::process::Process;
 
-/// A process of this host.
+/// A worker process of this host.
 #[derive(Debug)]
 pub struct Crew {
     /// Its name.
     pub name: String,
-    /// Its stages, by their place among those of this host.
+    /// Its stages, as indices into those of this host.
     pub stages: Vec<usize>,
-    /// Whether it is a program that is not ours, which knows one seat and ends by itself.
+    /// Whether it is an external program, which has one seat and ends by itself.
     pub outside: bool,
-    /// Which life it is in.
+    /// Number of the current incarnation.
     pub life: u64,
     process: Option<Process>,
-    /// Since nothing is left to do for it.
+    /// Wait for its exit, once it has nothing left to do.
     closing: Option<Patience>,
 }
 
 impl Crew {
-    /// A process that is to be started.
+    /// Creates a worker that has not been started.
     pub fn new(name: &str, outside: bool) -> Self {
         Self {
             name: name.to_owned(),
@@ -35,24 +35,24 @@ impl Crew {
         }
     }
 
-    /// The process, while there is one.
+    /// Returns the process, if it runs.
     pub fn process(&self) -> Option<&Process> {
         self.process.as_ref()
     }
 
-    /// It has been started.
+    /// Sets its running process.
     pub fn started(&mut self, process: Process) {
         self.process = Some(process);
         self.closing = None;
     }
 
-    /// It has ended.
+    /// Notes that its process has exited.
     pub fn exited(&mut self) {
         self.process = None;
         self.life += 1;
     }
 
-    /// What tells it to run the stages with these seats, which are one tree.
+    /// Returns the line for its standard input that starts the stages with these seats, which are one group.
     pub fn line(&self, seats: &[&Seat]) -> Result<Vec<u8>, serde_json::Error> {
         match seats {
             [seat] if self.outside => serde_json::to_vec(seat),
@@ -60,7 +60,7 @@ impl Crew {
         }
     }
 
-    /// Asks the stage of that name to end, and all that run with it in one tree.
+    /// Asks the stage of that name to end, with all stages of its group.
     pub fn stop(&self, stage: &str) {
         let Some(process) = &self.process else { return };
         process.tell(if self.outside {
@@ -70,7 +70,7 @@ impl Crew {
         });
     }
 
-    /// Nothing is left to do for it: it ends.
+    /// Closes its standard input, because it has nothing left to do: it exits.
     pub fn close(&mut self, now: Instant) {
         if let Some(process) = &mut self.process
             && self.closing.is_none()
@@ -80,7 +80,7 @@ impl Crew {
         }
     }
 
-    /// Ends it at once, if it has nothing left to do and stays.
+    /// Kills it if it has nothing left to do and does not exit.
     pub fn kill_if_it_stays(&mut self, now: Instant) {
         let overdue = self.closing.as_mut().and_then(|it| it.overdue(now));
         if overdue == Some(Overdue::Kill) {
@@ -88,7 +88,7 @@ impl Crew {
         }
     }
 
-    /// Ends it at once.
+    /// Kills it.
     pub fn kill(&self) {
         if let Some(process) = &self.process {
             process.kill();

@@ -1,15 +1,15 @@
-//! How a process ended, in words.
+//! Exit status of a process, in words.
 
 use std::os::unix::process::ExitStatusExt as _;
 use std::process::ExitStatus;
 
 use crate::doctor::{self, Verdict};
 
-/// What a process gets that touches a page of shared memory for which there is no room.
-/// Physical: the number that Linux gives it.
+/// Signal for access to a page of shared memory that the kernel cannot provide.
+/// Physical: its number on Linux.
 const SIGBUS: i32 = 7;
 
-/// How it ended. Where the reason is that shared memory is full, also what to do.
+/// Describes an exit status, with the remedy if shared memory is full.
 pub fn of(status: ExitStatus) -> String {
     match (status.signal(), status.code()) {
         (Some(SIGBUS), _) => bus_error(doctor::no_shared_memory()),
@@ -19,7 +19,7 @@ pub fn of(status: ExitStatus) -> String {
     }
 }
 
-/// `lack` is what is wrong with the shared memory of this host, if anything is.
+/// Describes a bus error; `lack` is the verdict on this host's shared memory, if it is an error.
 fn bus_error(lack: Option<Verdict>) -> String {
     let Some(Verdict { found, remedy, .. }) = lack else {
         return format!("was killed by signal {SIGBUS}, a bus error");

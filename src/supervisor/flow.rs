@@ -1,25 +1,25 @@
-//! How the samples of a stage come: how many, how fast, how long ago.
+//! Flow of samples through a stage: count, rate and age.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Rates are over this time; a table that changes faster cannot be read.
+/// Averaging time of rates; a table that changes faster cannot be read.
 const WINDOW: Duration = Duration::from_secs(3);
-/// Counts that are remembered within [`WINDOW`] are at least this far apart.
+/// Shortest time between two counts that are stored within [`WINDOW`].
 const APART: Duration = Duration::from_millis(100);
 
-/// The samples of one stage.
+/// Flow of samples through one stage.
 #[derive(Debug)]
 pub struct Flow {
     began: Instant,
-    /// When the count last grew, as far as is known here.
+    /// Time of the last known increase of the count.
     newest: Option<Instant>,
     counts: VecDeque<(Instant, u64)>,
     count: u64,
 }
 
 impl Flow {
-    /// None has come.
+    /// Creates a flow without samples.
     pub fn new(began: Instant) -> Self {
         Self {
             began,
@@ -29,7 +29,7 @@ impl Flow {
         }
     }
 
-    /// `count` have come by now; whether that is more than before.
+    /// Sets the number of samples so far; returns whether it has increased.
     pub fn note(&mut self, count: u64, now: Instant) -> bool {
         let grew = count > self.count;
         if grew {
@@ -46,12 +46,12 @@ impl Flow {
         grew
     }
 
-    /// How many have come.
+    /// Returns the number of samples so far.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// How many come in a second.
+    /// Returns the sample rate \[Hz\].
     pub fn rate_hz(&self, now: Instant) -> f64 {
         let Some(&(since, before)) = self.counts.front() else {
             return 0.0;
@@ -60,12 +60,12 @@ impl Flow {
         self.count.saturating_sub(before) as f64 / seconds.max(f64::MIN_POSITIVE)
     }
 
-    /// How long ago the newest came, if any did.
+    /// Returns the time since the newest sample; `None` before the first one.
     pub fn age(&self, now: Instant) -> Option<Duration> {
         self.newest.map(|newest| now.duration_since(newest))
     }
 
-    /// For how long none has come, since the start if none ever did.
+    /// Returns the time since the newest sample, or since the start before the first one.
     pub fn silent_for(&self, now: Instant) -> Duration {
         now.duration_since(self.newest.unwrap_or(self.began))
     }

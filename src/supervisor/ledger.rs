@@ -1,4 +1,4 @@
-//! The files in memory in which the stages keep their counts.
+//! In-memory files in which the stages keep their counts.
 
 use std::fs::File;
 use std::io;
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use rustix::fs::{MemfdFlags, memfd_create};
 use tauscope_bus::shell::{Account, Ledger};
 
-/// The counts of one stage. The file has no name and goes with the supervisor.
+/// The counts of one stage, in an anonymous file that exists as long as the supervisor.
 #[derive(Debug)]
 pub struct Kept {
     file: File,
@@ -17,10 +17,10 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// For a stage with so many inputs.
+    /// Creates the file of a stage with this number of inputs.
     ///
     /// # Errors
-    /// If the kernel gives no such file.
+    /// If the kernel cannot create the file.
     pub fn new(inputs: usize) -> io::Result<Self> {
         let length = Ledger::length(inputs);
         let file = File::from(memfd_create("ledger", MemfdFlags::CLOEXEC)?);
@@ -28,24 +28,24 @@ impl Kept {
         Ok(Self { file, length })
     }
 
-    /// Where the processes that this one starts find it.
+    /// Returns the path of the file for child processes of this one.
     pub fn path(&self) -> PathBuf {
         let (process, file) = (std::process::id(), self.file.as_raw_fd());
         PathBuf::from(format!("/proc/{process}/fd/{file}"))
     }
 
-    /// Another life begins.
+    /// Clears the counts for the next incarnation.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the file cannot be written.
     pub fn clear(&self) -> io::Result<()> {
         self.file.write_all_at(&vec![0; self.length], 0)
     }
 
-    /// What the stage has noted in this life.
+    /// Reads the counts of this incarnation.
     ///
     /// # Errors
-    /// If it cannot be read.
+    /// If the file cannot be read.
     pub fn account(&self) -> io::Result<Account> {
         let mut bytes = vec![0; self.length];
         self.file.read_exact_at(&mut bytes, 0)?;

@@ -1,6 +1,6 @@
-//! Who hangs: a stage says ten times a second how it fares, whether or not samples come. One that does not any more is
-//! named, and after a while its process is killed, so that it can begin again. Of stages of one thread their process
-//! says which one it is stuck in; the others only wait for that one.
+//! Detection of hung stages. Each stage sends a heartbeat ten times per second, whether or not samples arrive. A
+//! stage without heartbeats is reported; if it stays hung, its process is killed and restarted. Stages of one thread
+//! stop together: their process reports which of them is hung, and the others only wait for it.
 
 use std::time::Duration;
 
@@ -10,11 +10,11 @@ use super::Supervisor;
 use super::local::Local;
 use super::process::Process;
 
-/// A stage that has said nothing for so long hangs.
-/// Resolution: thirty reports are missing; a busy machine delays a few.
+/// Time without heartbeats after which a stage is treated as hung.
+/// Resolution: thirty heartbeats are missing; a busy machine delays a few.
 const HANGS_AFTER: Duration = Duration::from_secs(3);
-/// A process with a stage that hangs for so long is killed.
-/// Resolution: time for somebody who has stopped it to let it go on.
+/// Time without heartbeats of a stage after which its process is killed.
+/// Resolution: time for a person who has suspended it to resume it.
 const KILLED_AFTER: Duration = Duration::from_secs(30);
 
 impl Supervisor<'_> {
@@ -36,7 +36,8 @@ impl Supervisor<'_> {
                      killed in {left} s"
                 ));
             } else if is_new && self.stages[index].is_running() {
-                self.view.note(&format!("note: stage `{name}` goes on"));
+                self.view
+                    .note(&format!("note: stage `{name}` responds again"));
             }
             if unheard_for >= KILLED_AFTER {
                 self.crews[crew].kill();
@@ -44,14 +45,14 @@ impl Supervisor<'_> {
         }
     }
 
-    /// The stage that a thread is stuck in, if its process says so.
+    /// Returns the hung stage of a thread, if its process reports one.
     fn stuck_in(&self, crew: usize, root: usize) -> Option<&str> {
         let mut tree = (self.stages.iter()).filter(|it| it.crew == crew && it.root == root);
         let stuck = tree.find(|stage| stage.is_stuck());
         stuck.map(|stage| stage.seat.stage.as_str())
     }
 
-    /// Tells the service manager how the run fares.
+    /// Reports the state of the run to the service manager.
     pub(super) fn tell_service(&mut self, now: Instant) {
         let is_there = |stage: &Local| stage.is_ready() || stage.is_over();
         let ready = self.stages.iter().all(is_there);

@@ -1,4 +1,4 @@
-//! The lives of processes and of the trees of stages in them: how they begin, how they end, who comes back.
+//! Life cycle of processes and of the stage groups in them: start, end and restart.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,7 +16,7 @@ use super::local::{FAILED, Local};
 use super::process::{self, Process};
 use crate::plan::{self, Link};
 
-/// The stages with these seats and the processes they run in.
+/// Returns the stages with these seats, and the processes in which they run.
 pub(super) fn crews(
     pipeline: &Pipeline,
     links: &[Link],
@@ -38,11 +38,11 @@ pub(super) fn crews(
             crews.len() - 1
         });
         crews[place].stages.push(index);
-        // A tree is on one host.
+        // All stages of a group are on one host.
         let root = here.get(&roots[at]).copied().unwrap_or(index);
         stages.push(Local::new(at, seat, place, root));
     }
-    // They die together: of what they say of another life, the strictest holds.
+    // The stages of a group fail together, so the strictest of their restart policies applies.
     for index in 0..stages.len() {
         let policy = pipeline.stages[stages[index].at].restart;
         let root = stages[index].root;
@@ -52,7 +52,7 @@ pub(super) fn crews(
 }
 
 impl Supervisor<'_> {
-    /// Those that listen before those they listen to, so that few wait for long.
+    /// Starts all stages, receivers before senders, so that few have to wait for long.
     pub(super) fn start_all(&mut self) -> anyhow::Result<()> {
         for index in (0..self.stages.len()).rev() {
             if self.stages[index].root == index {
@@ -62,7 +62,7 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Starts a tree, and its process where it does not run.
+    /// Starts a group, and its process if it does not run.
     pub(super) fn start(&mut self, root: usize) -> anyhow::Result<()> {
         let tree = self.tree(root);
         let seats: Vec<&Seat> = tree.iter().map(|&index| &self.stages[index].seat).collect();
@@ -76,7 +76,7 @@ impl Supervisor<'_> {
             let settings = &self.pipeline.stages[self.stages[root].at].settings;
             let folder = self.pipeline.path.parent().unwrap_or(Path::new(""));
             let command = process::command(settings, folder)?;
-            // The seats of each tree, a word to end for each stage, and the same once more.
+            // Per stage the seats of a group and a request to end, and the same once more.
             let most_told = 4 * crew.stages.len() + 2;
             let (name, mark) = (crew.name.clone(), (place, crew.life));
             let events = self.sender.clone();
@@ -95,20 +95,20 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// The stages of a tree, its first one first.
+    /// Returns the stages of a group, its root first.
     pub(super) fn tree(&self, root: usize) -> Vec<usize> {
         let all = 0..self.stages.len();
         all.filter(|&index| self.stages[index].root == root)
             .collect()
     }
 
-    /// Whether nothing runs and nothing will.
+    /// Returns whether nothing runs and nothing will be started.
     pub(super) fn is_over(&self) -> bool {
         self.stages.iter().all(Local::is_over)
             && self.crews.iter().all(|crew| crew.process().is_none())
     }
 
-    /// Which stage of a process a line is from.
+    /// Returns the stage of a process that a line is from.
     pub(super) fn speaker(&self, crew: usize, line: &str) -> Option<usize> {
         #[derive(Deserialize)]
         struct Named {
@@ -123,7 +123,7 @@ impl Supervisor<'_> {
         stages.find(|&index| self.stages[index].seat.stage == named.stage)
     }
 
-    /// A stage of a tree has said that it is over: once all have, so is the tree.
+    /// Ends a group if all of its stages have reported their end.
     pub(super) fn tree_ended(&mut self, root: usize) {
         let tree = self.tree(root);
         let over = |&index: &usize| {
@@ -136,7 +136,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// A process has ended, and all that it said was heard.
+    /// Handles the exit of a process, after all of its output.
     pub(super) fn process_ended(&mut self, crew: usize, status: &std::io::Result<ExitStatus>) {
         let stages = self.crews[crew].stages.clone();
         let in_order = status.as_ref().is_ok_and(ExitStatus::success);
@@ -155,7 +155,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// A tree is over, by its process's end if `exit` is given.
+    /// Ends or restarts a group that is over; `exit` is the exit status of its process, if that has exited.
     fn over(&mut self, tree: &[usize], exit: Option<&std::io::Result<ExitStatus>>) {
         let running: Vec<usize> = (tree.iter().copied())
             .filter(|&index| self.stages[index].is_running())
@@ -186,7 +186,7 @@ impl Supervisor<'_> {
             }
             stage.die(again);
         }
-        // What follows from it comes behind the cause.
+        // Report the consequences after the cause.
         if !with_it.is_empty() {
             self.view.warn(&fell_with_it(&with_it.join(", "), again));
         }
@@ -195,7 +195,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Ends the processes that have nothing left to do.
+    /// Closes the processes that have nothing left to do.
     pub(super) fn close_crews(&mut self) {
         for crew in &mut self.crews {
             let mut stages = crew.stages.iter().map(|&index| &self.stages[index]);
@@ -205,7 +205,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Asks a stage, and its tree, to end.
+    /// Asks a stage, and its group, to end.
     pub(super) fn ask_to_end(&mut self, index: usize, recorder: bool) {
         if self.stages[index].is_to_end(recorder) {
             let stage = &self.stages[index];
@@ -213,7 +213,8 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Ends a stage that does not end itself: its process, or, where others still live in that, its tree is given up.
+    /// Ends a stage that does not end itself: kills its process or, if other stages still run in it, gives up its
+    /// group.
     pub(super) fn kill_stubborn(&mut self, index: usize) {
         let Local { crew, root, .. } = self.stages[index];
         let tree = self.tree(root);
@@ -232,7 +233,7 @@ impl Supervisor<'_> {
 
 fn died(name: &str, how: &str, again: Option<Duration>) -> String {
     match again {
-        // What it said itself is a sentence of its own.
+        // The stage's own reason is a sentence of its own.
         None if how.starts_with(FAILED) => {
             format!("error: stage `{name}` {how}\n  it is not started again, and the run ends")
         }
@@ -245,7 +246,7 @@ fn died(name: &str, how: &str, again: Option<Duration>) -> String {
     }
 }
 
-/// Of stages that ended because another one of their tree did.
+/// Describes stages that ended because another one of their group did.
 fn fell_with_it(names: &str, again: Option<Duration>) -> String {
     match again {
         None => format!("  what runs with it ended, too: {names}"),

@@ -1,4 +1,4 @@
-//! One stage of this host, through all its lives.
+//! One stage of this host, over all its incarnations.
 
 use std::process::ExitStatus;
 use std::time::Duration;
@@ -20,66 +20,66 @@ use super::tally::Tally;
 /// A stage of this host.
 #[derive(Debug)]
 pub struct Local {
-    /// Its place in the pipeline.
+    /// Index in the pipeline.
     pub at: usize,
-    /// What its process is told.
+    /// Assignment that its process receives.
     pub seat: Seat,
-    /// The process it runs in, by its place among those of this host.
+    /// Its worker process, as an index into those of this host.
     pub crew: usize,
-    /// The first stage of its tree, by its place among those of this host. They begin, end and die together.
+    /// Root of its group, as an index into the stages of this host. A group starts, ends and fails together.
     pub root: usize,
-    /// What it has done, over all its lives.
+    /// Counts over all incarnations.
     pub tally: Tally,
     state: State,
     deaths: Deaths,
-    /// When it is started again; of a tree its first stage knows.
+    /// Restart policy; that of a group is at its root.
     policy: Option<Restart>,
     pulse: Pulse,
-    /// No life follows this one.
+    /// Whether this is the last incarnation.
     last_life: bool,
-    /// It has said in this life that it begins.
+    /// Whether this incarnation is ready.
     ready: bool,
-    /// How its samples come.
+    /// Flow of its samples.
     pub flow: Flow,
-    /// What holds there, in a word or two; empty for nothing of note.
+    /// Current condition in a word or two, such as `muted`; empty if there is none.
     pub holds: String,
-    /// What was told of it while none came.
+    /// Reports on missing samples.
     pub silence: Silence,
-    /// Since it was told to end.
+    /// Wait for its end, once it was asked to end.
     patience: Option<Patience>,
-    /// It did not end and was killed.
+    /// Whether it was killed because it did not end.
     killed: bool,
-    /// By when it should have ended by itself.
+    /// Time by which it should end by itself.
     finish_by: Option<Instant>,
-    /// What it keeps beyond its death; without it, its reports must do.
+    /// Counts that survive its death; without them, its last report is used.
     kept: Option<Kept>,
 }
 
-/// Whether it lives, in this life.
+/// Heartbeat of this incarnation.
 #[derive(Debug, Default)]
 struct Pulse {
-    /// When it last said how it fares.
+    /// Time of the last heartbeat.
     heard: Option<Instant>,
-    /// Its process has said since then that this stage is what its thread is stuck in.
+    /// Whether its process has reported since then that this stage blocks its thread.
     stuck: bool,
-    /// It was told that it hangs.
+    /// Whether it has been reported as hung.
     hangs: bool,
 }
 
 #[derive(Debug)]
 enum State {
-    /// It runs.
+    /// Running.
     Running,
-    /// It is started at this time, for the first time or again.
+    /// To be started at this time, for the first time or again.
     Waiting(Instant),
-    /// It has ended in order.
+    /// Ended normally.
     Ended,
-    /// It died and does not come back.
+    /// Failed, and not restarted.
     Lost,
 }
 
 impl Local {
-    /// A stage that is to be started.
+    /// Creates a stage that is to be started.
     pub fn new(at: usize, mut seat: Seat, crew: usize, root: usize) -> Self {
         let now = Instant::now();
         let kept = Kept::new(seat.inputs.len()).ok();
@@ -106,37 +106,37 @@ impl Local {
         }
     }
 
-    /// Whether it listens to nobody.
+    /// Returns whether it has no inputs.
     pub fn is_source(&self) -> bool {
         self.seat.inputs.is_empty()
     }
 
-    /// Whether it runs and has said that it begins.
+    /// Returns whether it runs and is ready.
     pub fn is_ready(&self) -> bool {
         self.ready && self.is_running()
     }
 
-    /// Whether it did not end and was killed.
+    /// Returns whether it was killed because it did not end.
     pub fn was_killed(&self) -> bool {
         self.killed
     }
 
-    /// Why it gives nothing that can be used, as it says itself.
+    /// Returns the reason why it emits nothing usable, as it reports itself.
     pub fn trouble(&self) -> Option<&Trouble> {
         self.tally.newest().trouble.as_ref()
     }
 
-    /// Whether its process has been told to run it, and it has not ended.
+    /// Returns whether its process was asked to run it, and it has not ended.
     pub fn is_running(&self) -> bool {
         matches!(self.state, State::Running)
     }
 
-    /// Whether it has said in this life that it is over.
+    /// Returns whether this incarnation has reported its end.
     pub fn is_done(&self) -> bool {
         self.tally.newest().outcome.is_some()
     }
 
-    /// Its process has been told to run it.
+    /// Notes that its process was asked to run it.
     pub fn started(&mut self) {
         self.state = State::Running;
         self.ready = false;
@@ -145,27 +145,27 @@ impl Local {
         self.patience = None;
     }
 
-    /// It cannot be started, or not any more.
+    /// Gives it up: it is not started again.
     pub fn give_up(&mut self) {
         self.state = State::Lost;
     }
 
-    /// Whether nothing more comes from it.
+    /// Returns whether it has ended for good.
     pub fn is_over(&self) -> bool {
         matches!(self.state, State::Ended | State::Lost)
     }
 
-    /// Whether it died and did not come back.
+    /// Returns whether it failed and was not restarted.
     pub fn is_lost(&self) -> bool {
         matches!(self.state, State::Lost)
     }
 
-    /// Whether it is to be started.
+    /// Returns whether it is to be started.
     pub fn is_waiting(&self) -> bool {
         matches!(self.state, State::Waiting(_))
     }
 
-    /// When there is something to do for it.
+    /// Returns the time of the next action on it: its start, or a request to end.
     pub fn due(&self) -> Option<Instant> {
         match self.state {
             State::Waiting(at) => Some(at),
@@ -174,12 +174,12 @@ impl Local {
         }
     }
 
-    /// How far a source is.
+    /// Returns the progress of a source of known length, from 0 to 1.
     pub fn fraction_done(&self) -> Option<f64> {
         self.tally.newest().fraction_done
     }
 
-    /// Takes a line of its standard output; what is none of the protocol comes back.
+    /// Handles a line of its standard output, and returns its meaning.
     pub fn report<'a>(&mut self, line: &'a str) -> Reported<'a> {
         match serde_json::from_str(line) {
             Ok(Line::Ready { missing, .. }) => {
@@ -208,7 +208,7 @@ impl Local {
         Reported::Counts
     }
 
-    /// Samples that came in; for a source, those that went out.
+    /// Returns the number of received samples; for a source, of emitted ones.
     fn samples(&self) -> u64 {
         let sums = self.tally.sums();
         if self.is_source() {
@@ -219,12 +219,12 @@ impl Local {
         data.map(|(_, counts)| counts.received).sum()
     }
 
-    /// How it died, where it did: by its process's end if `exit` is given, else by what it said itself.
+    /// Describes its failure, if it has failed; `exit` is the exit status of its process, if that has exited.
     pub fn death(&self, exit: Option<&std::io::Result<ExitStatus>>) -> Option<String> {
         let outcome = self.tally.newest().outcome.as_ref();
         let failed = outcome.and_then(Outcome::failure);
         if self.killed {
-            return Some("did not end when it was told to, was killed".to_owned());
+            return Some("did not end when asked to, was killed".to_owned());
         }
         match (failed, exit) {
             (Some(why), _) => Some(format!("{FAILED}: {why}")),
@@ -234,14 +234,14 @@ impl Local {
         }
     }
 
-    /// Whether it says that it ended because another stage of its tree did.
+    /// Returns whether it reports that it ended because another stage of its group did.
     pub fn fell_with_another(&self) -> bool {
         let outcome = self.tally.newest().outcome.as_ref();
         outcome.is_some_and(Outcome::is_of_another)
     }
 
-    /// Whether another life could fare better. One that says itself why it cannot even begin would say the same again,
-    /// as would one whose input is not what it was made for.
+    /// Returns whether a restart may help. It does not help a stage that reports why it cannot start, or that its
+    /// input is not the one it was made for.
     pub fn may_return(&self) -> bool {
         let outcome = self.tally.newest().outcome.as_ref();
         let is_unfit = matches!(outcome, Some(Outcome::Unfit(_)));
@@ -249,19 +249,19 @@ impl Local {
         can_begin && !self.last_life && self.patience.is_none()
     }
 
-    /// Notes a death of its tree, and says after what time it is started again, if it is.
+    /// Notes a failure of its group; returns the delay before the restart, or `None` if there is none.
     pub fn note_death(&mut self) -> Option<Duration> {
         let policy = self.policy.unwrap_or_default();
         self.deaths.note(&policy, std::time::Instant::now())
     }
 
-    /// Its tree is started again by this policy, too.
+    /// Adds the restart policy of a stage of its group; the strictest applies.
     pub fn restart_by(&mut self, policy: Restart) {
         let policy = self.policy.map_or(policy, |own| own.strictest(policy));
         self.policy = Some(policy);
     }
 
-    /// Whether it is started again although it ended in order.
+    /// Returns whether it is restarted even after a normal end.
     pub fn returns_always(&self) -> bool {
         let always = self
             .policy
@@ -269,8 +269,8 @@ impl Local {
         always && !self.last_life && self.patience.is_none()
     }
 
-    /// For how long it has not said how it fares, which a stage does ten times a second while it runs. Not of one that
-    /// has never said it in this life: it waits for others, or does not speak.
+    /// Returns the time since its last heartbeat, which a running stage sends ten times per second. `None` before the
+    /// first heartbeat of an incarnation: the stage waits for others, or sends none.
     pub fn unheard_for(&self, now: Instant) -> Option<Duration> {
         let heard = self
             .pulse
@@ -279,27 +279,27 @@ impl Local {
         heard.map(|heard| now.duration_since(heard))
     }
 
-    /// Whether it is the one of its thread that does not go on, as its process says.
+    /// Returns whether it blocks its thread, as its process reports.
     pub fn is_stuck(&self) -> bool {
         self.pulse.stuck
     }
 
-    /// Notes whether it hangs; true if that is new.
+    /// Sets whether it is hung; returns whether that has changed.
     pub fn note_hangs(&mut self, hangs: bool) -> bool {
         std::mem::replace(&mut self.pulse.hangs, hangs) != hangs
     }
 
-    /// Whether it hangs, as far as was noted.
+    /// Returns whether it was last noted as hung.
     pub fn hangs(&self) -> bool {
         self.pulse.hangs
     }
 
-    /// It has ended in order.
+    /// Notes its normal end.
     pub fn end(&mut self) {
         self.state = State::Ended;
     }
 
-    /// It died, and is started again after this time, if it is.
+    /// Notes its failure; `again` is the delay before its restart, if there is one.
     pub fn die(&mut self, again: Option<Duration>) {
         self.settle();
         self.state = match again {
@@ -311,22 +311,22 @@ impl Local {
         };
     }
 
-    /// Takes over what it has noted since its last report, and makes room for the next life. One that has said itself
-    /// how it ended has counted all.
+    /// Adds the counts since its last report, and clears them for the next incarnation. A stage that has reported its
+    /// end has reported all of them.
     fn settle(&mut self) {
         let Some(kept) = &self.kept else { return };
         if let (false, Ok(account)) = (self.is_done(), kept.account()) {
             let from = self.seat.inputs.iter().map(|input| input.from.as_str());
             self.tally.settle(&account, from);
         }
-        // What cannot be cleared is not to be read any more.
+        // Counts that cannot be cleared must not be read again.
         if kept.clear().is_err() {
             self.kept = None;
             self.seat.ledger = None;
         }
     }
 
-    /// Makes the seat of the next life out of what the last one has said.
+    /// Prepares the seat of the next incarnation from the last report.
     fn next_life(&mut self) {
         let last: Report = self.tally.end_life();
         self.seat.restarts += 1;
@@ -345,7 +345,7 @@ impl Local {
         }
     }
 
-    /// No life follows this one.
+    /// Prevents further restarts.
     pub fn no_restart(&mut self) {
         self.last_life = true;
         if self.is_waiting() {
@@ -353,14 +353,14 @@ impl Local {
         }
     }
 
-    /// It should end by itself by then.
+    /// Sets the time by which it should end by itself.
     pub fn finish_by(&mut self, by: Instant) {
         self.last_life = true;
         self.finish_by.get_or_insert(by);
     }
 
-    /// It is told to end; a stage that does not is [`Local::overdue`] then, a `recorder` later than others. Whether it
-    /// was not told before.
+    /// Notes the request to end. A stage that does not end becomes [`Local::overdue`], a `recorder` later than
+    /// others. Returns whether it runs and was not asked before.
     pub fn is_to_end(&mut self, recorder: bool) -> bool {
         let first = self.patience.is_none();
         self.patience
@@ -368,7 +368,7 @@ impl Local {
         first && self.is_running()
     }
 
-    /// Whether it should have ended by now, and what is to be done of it.
+    /// Returns the action that is due on a stage that should have ended.
     pub fn overdue(&mut self, now: Instant) -> Option<Overdue> {
         if !self.is_running() {
             return None;
@@ -376,11 +376,11 @@ impl Local {
         self.patience.as_mut()?.overdue(now)
     }
 
-    /// It does not end, and is killed.
+    /// Notes that it is killed because it does not end.
     pub fn is_killed(&mut self) {
         self.killed = true;
     }
 }
 
-/// How [`Local::death`] begins where a stage says itself why.
+/// Prefix of [`Local::death`] if the stage reports the reason itself.
 pub const FAILED: &str = "failed";

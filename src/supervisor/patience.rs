@@ -1,14 +1,14 @@
-//! How long a stage that was told to end is waited for.
+//! Wait for a stage that was asked to end.
 
 use std::time::Duration;
 
 use tokio::time::Instant;
 
-/// A stage that still runs so long after it was told to end, without taking any sample, is named.
+/// Time after the request to end, or after the newest sample since, after which a stage that still runs is reported.
 const NAMED_AFTER: Duration = Duration::from_secs(2);
-/// And after this time it is killed.
+/// Time after which it is killed.
 const KILLED_AFTER: Duration = Duration::from_secs(10);
-/// A recorder may have to write much to a slow disk; killed, it would leave a `.part`.
+/// Time after which a recorder is killed. It may have to write much to a slow disk; killed, it would leave a `.part`.
 const RECORDER_KILLED_AFTER: Duration = Duration::from_mins(1);
 
 /// The wait for one stage to end.
@@ -20,17 +20,17 @@ pub struct Patience {
     killed: bool,
 }
 
-/// What is to be done of a stage that does not end.
+/// Action on a stage that does not end.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Overdue {
-    /// It is to be named; after this time it is killed.
+    /// Report it; it is killed after this time.
     Name(Duration),
-    /// It is to be killed.
+    /// Kill it.
     Kill,
 }
 
 impl Patience {
-    /// With a stage that was told to end now.
+    /// Starts the wait for a stage that is asked to end now.
     pub fn new(recorder: bool, now: Instant) -> Self {
         Self {
             since: now,
@@ -44,12 +44,12 @@ impl Patience {
         }
     }
 
-    /// It takes samples still: it is about to end.
+    /// Restarts the wait: the stage still takes samples.
     pub fn extend(&mut self, now: Instant) {
         self.since = now;
     }
 
-    /// What is to be done by now; each once.
+    /// Returns the action that is due at `now`; each action once.
     pub fn overdue(&mut self, now: Instant) -> Option<Overdue> {
         let waited = now.duration_since(self.since);
         if waited >= self.killed_after && !self.killed {

@@ -1,4 +1,4 @@
-//! One process: started, listened to, ended.
+//! One process: its start, its input and output, and its end.
 
 use std::path::Path;
 use std::pin::pin;
@@ -12,19 +12,19 @@ use tokio::io::{AsyncBufReadExt, AsyncRead, AsyncWriteExt, BufReader};
 use tokio::process::{Child, ChildStdin, Command};
 use tokio::sync::mpsc;
 
-/// Longer lines of a stage are cut.
+/// Longest line of a stage's output; longer ones are cut.
 const LONGEST_LINE_BYTES: usize = 64 * 1024;
-/// How long a dead process is still heard out.
+/// Time for which the output of a dead process is still read.
 const LAST_WORDS: Duration = Duration::from_millis(200);
 
-/// What a process does.
+/// Event of a process.
 #[derive(Debug)]
 pub enum Event {
     /// A line on its standard error.
     Said(String),
     /// A line on its standard output.
     Reported(String),
-    /// It has ended, and all it said was heard.
+    /// Its exit, after all of its output.
     Exited(std::io::Result<ExitStatus>),
 }
 
@@ -32,11 +32,11 @@ pub enum Event {
 #[derive(Debug)]
 pub struct Process {
     group: Pid,
-    /// What it is still to be told; none once it is told no more.
+    /// Queue of lines for its standard input; `None` once it is closed.
     orders: Option<mpsc::Sender<Vec<u8>>>,
 }
 
-/// How the process of a stage is started.
+/// Returns the command that starts the process of a stage.
 pub fn command(settings: &Settings, folder: &Path) -> anyhow::Result<Command> {
     let program = std::env::current_exe().context("cannot find the program itself")?;
     let mut command = Command::new(program);
@@ -55,8 +55,8 @@ pub fn command(settings: &Settings, folder: &Path) -> anyhow::Result<Command> {
 }
 
 impl Process {
-    /// Starts it and tells it this line; what it does comes to `events`, marked with `mark`. At most `most_told` lines
-    /// wait to be read by it.
+    /// Starts the process and sends it this line; its events go to `events`, marked with `mark`. At most `most_told`
+    /// lines wait to be read by it.
     pub fn start<M: Copy + Send + Sync + 'static>(
         mut command: Command,
         name: &str,
@@ -66,12 +66,12 @@ impl Process {
         events: mpsc::Sender<(M, Event)>,
     ) -> anyhow::Result<Self> {
         let mut child = command
-            // The run speaks for itself to whoever started it as a service.
+            // Only the supervisor notifies the service manager.
             .env_remove("NOTIFY_SOCKET")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
-            // Ctrl-C in a terminal goes to the supervisor alone, which ends the stages in order.
+            // Ctrl-C in a terminal then only reaches the supervisor, which ends the stages itself.
             .process_group(0)
             .spawn()
             .with_context(|| format!("cannot start the process of `{name}`"))?;
@@ -88,22 +88,22 @@ impl Process {
         Ok(Self { group, orders })
     }
 
-    /// Tells it a line.
+    /// Queues a line for its standard input.
     pub fn tell(&self, line: Vec<u8>) {
-        // A process that has let so many lines lie does not read; a closed inbox has no reader left.
+        // If the queue is full, the process does not read; if it is closed, the process has exited.
         if let Some(orders) = &self.orders {
             let _ = orders.try_send(line);
         }
     }
 
-    /// Tells it no more: it ends once it has done what it was told.
+    /// Closes its standard input: it exits once it has handled the queued lines.
     pub fn close(&mut self) {
         self.orders = None;
     }
 
-    /// Ends it and all that it started, at once.
+    /// Kills it and all processes that it has started.
     pub fn kill(&self) {
-        // The only error is that it has gone already.
+        // The only error is that it has already exited.
         let _ = kill_process_group(self.group, Signal::KILL);
     }
 
@@ -119,12 +119,12 @@ impl Drop for Process {
     }
 }
 
-/// Writes to a process what it is told, and closes its standard input once nobody can tell it more.
+/// Writes queued lines to the standard input of a process, and closes it once the queue is closed.
 async fn tell(mut stdin: ChildStdin, first: Vec<u8>, mut orders: mpsc::Receiver<Vec<u8>>) {
     let mut next = Some(first);
     while let Some(mut line) = next {
         line.push(b'\n');
-        // A process that does not listen any more is one that exits, which is noticed elsewhere.
+        // A broken pipe means that the process exits, which `follow` notices.
         if stdin.write_all(&line).await.is_err() {
             return;
         }
@@ -132,7 +132,7 @@ async fn tell(mut stdin: ChildStdin, first: Vec<u8>, mut orders: mpsc::Receiver<
     }
 }
 
-/// Hears a process out and waits for it.
+/// Forwards the output of a process and waits for its exit.
 async fn follow<M: Copy + Send + Sync + 'static>(
     mut child: Child,
     mark: M,
@@ -150,8 +150,7 @@ async fn follow<M: Copy + Send + Sync + 'static>(
     let status = tokio::select! {
         _ = &mut heard => child.wait().await,
         status = child.wait() => {
-            // What it said last is still in the pipes; but a process that it started may hold them
-            // open for ever.
+            // Its last output is still in the pipes, but a process that it has started may keep them open forever.
             let _ = tokio::time::timeout(LAST_WORDS, heard).await;
             status
         }

@@ -1,21 +1,21 @@
-//! What a stage's process says, as the supervisor takes it.
+//! Lines of a stage's process, as the supervisor handles them.
 
-/// What a line of a stage's standard output said.
+/// Meaning of a line of a stage's standard output.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Reported<'a> {
-    /// It begins, with so many receivers missing.
+    /// The stage is ready.
     Ready {
-        /// How many.
+        /// Number of its receivers that are missing.
         missing: usize,
     },
-    /// What it has counted.
+    /// Its counts.
     Counts,
-    /// That it does not go on.
+    /// It blocks its thread.
     Stuck,
-    /// What holds there.
+    /// Its current condition.
     Holds,
-    /// What it has found.
+    /// A finding or a note.
     Note(String),
-    /// Something that is none of the protocol.
+    /// A line that is not part of the protocol.
     Other(&'a str),
 }

@@ -1,19 +1,19 @@
-//! When a stage that died is started again.
+//! Restart delays of stages that failed.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use tauscope_pipeline::pipeline::{Restart, When};
 
-/// The deaths of one stage.
+/// Recent failures of one stage.
 #[derive(Debug, Default)]
 pub struct Deaths {
     recent: VecDeque<Instant>,
 }
 
 impl Deaths {
-    /// Notes a death, and says after what time to start the stage again: at once the first time,
-    /// later the more often it dies; `None` if it dies too often for `policy`.
+    /// Notes a failure, and returns the delay before the restart: none the first time, longer the more often the
+    /// stage fails. `None` if it fails too often for `policy`.
     pub fn note(&mut self, policy: &Restart, now: Instant) -> Option<Duration> {
         if policy.when == When::Never {
             return None;
@@ -34,7 +34,7 @@ impl Deaths {
         let Some(doublings) = before.checked_sub(1) else {
             return Some(Duration::ZERO);
         };
-        // More doublings than this are longer than any longest wait.
+        // More doublings exceed any longest delay.
         let wait_s = policy.wait_s * f64::from(1_u32 << doublings.min(31));
         Some(Duration::from_secs_f64(wait_s.min(policy.longest_wait_s)))
     }

@@ -1,4 +1,4 @@
-//! Where the stages of this host meet those of other hosts.
+//! Router between the stages of this host and other hosts.
 
 use std::net::{Ipv4Addr, TcpListener};
 
@@ -8,11 +8,11 @@ use tauscope_pipeline::pipeline::Pipeline;
 
 use crate::plan::{Link, Over};
 
-/// Holds this host's endpoints, which only one process can, and passes on between them and the
-/// stages, which connect to it over loopback.
+/// The router of this host. It owns the host's endpoints, which only one process can, and forwards between them and
+/// the stages, which connect to it over loopback.
 #[derive(Debug)]
 pub struct Router {
-    /// Passes on until it is dropped.
+    /// Forwards until it is dropped.
     _router: ZenohRouter,
     local: String,
 }
@@ -48,13 +48,13 @@ impl Router {
         }))
     }
 
-    /// Where this host's stages connect to.
+    /// Returns the endpoint to which this host's stages connect.
     pub fn endpoint(&self) -> &str {
         &self.local
     }
 }
 
-/// An endpoint that was free a moment ago.
+/// Returns an endpoint that was free a moment ago.
 fn free_local_endpoint() -> std::io::Result<String> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
     Ok(format!("tcp/{}", listener.local_addr()?))

@@ -1,4 +1,4 @@
-//! What each stage's process is told: its seat.
+//! Assignments of the stages to their processes: one seat per stage.
 
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,53 +14,52 @@ use tauscope_pipeline::settings::Settings;
 
 use crate::plan::{Link, Over};
 
-/// Samples that a stage which keeps all may leave unread before those before it wait.
+/// Queue length of an input that keeps all samples; the sender waits while it is full.
 const DEPTH_ALL: usize = 1024;
-/// Samples that a stage which keeps the newest may leave unread: some, so that a pause of the
-/// scheduler costs nothing.
+/// Queue length of an input that keeps the newest samples: long enough that a pause of the scheduler loses nothing.
 const DEPTH_NEWEST: usize = 16;
-/// The same for who hears several streams and tells others, or hears another host, whose samples come many at once: a
-/// longer pause costs nothing either.
+/// Queue length of such an input of a recorder or publisher, or from another host, where samples arrive in bursts: a
+/// longer pause loses nothing either.
 const DEPTH_TOLD: usize = 256;
-/// Most memory of the samples that wait for slow listeners, by stream \[bytes\]: 17 s of joint states at 1 kHz.
-/// Resolution: memory, against the pause of a recorder that costs nothing.
+/// Largest backlog for slow receivers, by stream \[bytes\]: 17 s of joint states at 1 kHz.
+/// Resolution: memory, against the longest pause of a recorder without loss.
 const SPILL_BYTES: usize = 16 << 20;
-/// The same where they listen on other hosts: 60 s of twin states at 1 kHz.
-/// Resolution: memory, against the cut of a network that costs nothing.
+/// Largest backlog for receivers on other hosts, by stream \[bytes\]: 60 s of twin states at 1 kHz.
+/// Resolution: memory, against the longest network outage without loss.
 const SPILL_ACROSS_HOSTS_BYTES: usize = 64 << 20;
-/// Samples for recorders and publishers are sent together so often \[ms\].
-/// Resolution: how often a process wakes up, against the delay of a recording.
+/// Batching interval of samples for recorders and publishers \[ms\].
+/// Resolution: wake-ups of a process, against the delay of a recording.
 const SPILL_LINGER_MS: u64 = 5;
-/// Receivers that died and that nobody has cleaned up after yet.
+/// Extra receivers per stream, for those that died and are not cleaned up yet.
 /// Resolution: shared memory.
 const LIVES: usize = 2;
-/// Stages of another host are started by another hand: how long they are waited for \[ms\].
+/// Longest wait for stages of other hosts, which are started independently \[ms\].
 const START_ACROSS_HOSTS_MS: u64 = 60_000;
 
-/// What a stage of ours finds in its seat as `config`.
+/// Content of `config` in the seat of a built-in stage.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Instructions {
     /// Its own part of the pipeline file.
     pub settings: Settings,
     /// Its cells.
     pub cells: Vec<CellFacts>,
-    /// What is known of the stages it listens to, for a recorder or a publisher.
+    /// Facts about its input streams, for a recorder or a publisher.
     pub streams: Vec<StreamFacts>,
-    /// What made the archive, for a recorder.
+    /// Provenance of the archive, for a recorder.
     pub provenance: BTreeMap<String, String>,
-    /// For a simulated source.
+    /// Scenario, for a simulated source.
     #[serde(default)]
     pub scenario: Option<ScenarioFacts>,
-    /// For a source that is started again: the stamp of the last sample it gave out \[ns\].
+    /// Stamp of the last emitted sample, for a source that is restarted \[ns\].
     #[serde(default)]
     pub after_ns: Option<i64>,
-    /// For a source: whether anything in its cell learns while it runs.
+    /// Whether any stage of its cell learns on command, for a source.
     #[serde(default)]
     pub somebody_learns: bool,
 }
 
-/// The seats of the stages on `host` (of all without one), with their place in the pipeline; where
-/// they meet other hosts, at `router`.
+/// Returns the seats of the stages on `host` (all stages if `None`), with their index in the pipeline. `router` is
+/// the endpoint for links to other hosts.
 pub fn seats(
     pipeline: &Pipeline,
     links: &[Link],
@@ -85,7 +84,7 @@ struct Planner<'a> {
     pipeline: &'a Pipeline,
     links: &'a [Link],
     domain: &'a Domain,
-    /// Where the stages of this host meet other hosts.
+    /// Endpoint for links to other hosts.
     router: Option<&'a str>,
 }
 
@@ -131,7 +130,7 @@ impl Planner<'_> {
         Ok(seat)
     }
 
-    /// The most listeners of one stream in shared memory, and room for as many of former lives.
+    /// Returns the largest number of receivers of one stream in shared memory, plus [`LIVES`].
     fn receivers(&self) -> usize {
         let shared = |link: &&Link| link.over == Over::SharedMemory;
         let mut count = BTreeMap::<(usize, bool), usize>::new();
@@ -170,7 +169,7 @@ impl Planner<'_> {
         }
     }
 
-    /// Whether anything in these cells learns when it is told to, as far as one knows.
+    /// Returns whether any stage in these cells may learn on command; an external program may.
     fn learns(&self, cells: &BTreeSet<String>) -> bool {
         let stages = self.pipeline.stages.iter();
         let mut there = stages.filter(|stage| stage.cells.iter().any(|cell| cells.contains(cell)));
@@ -210,7 +209,7 @@ impl Planner<'_> {
             };
             inputs.push(input(link.stream.clone(), link.carries, wake));
             if self.hears_health(at) {
-                // Few, so that each look would cost more than it saves.
+                // Health reports are rare: polling would cost more than it saves.
                 inputs.push(input(
                     health_stream(&link.stream),
                     SampleKind::Health,
@@ -221,7 +220,7 @@ impl Planner<'_> {
         inputs
     }
 
-    /// A recorder keeps the health reports of what it records, a publisher tells them.
+    /// Returns whether a stage receives health reports: a recorder stores them, a publisher publishes them.
     fn hears_health(&self, at: usize) -> bool {
         self.pipeline.stages[at].role.hears_health()
     }
@@ -249,7 +248,7 @@ impl Planner<'_> {
         }
     }
 
-    /// The ways a stream leaves its tree, and how many listen on each.
+    /// Returns the links by which a stream leaves its group, with the number of receivers of each.
     fn ways(&self, at: usize, kind: SampleKind, listeners: &[&Link]) -> Vec<OutputLink> {
         let way = |over: Over| {
             let there = || listeners.iter().filter(|link| link.over == over);
@@ -260,7 +259,7 @@ impl Planner<'_> {
             };
             let takes = |link: &&Link| self.pipeline.stages[link.to].role.gives().is_none();
             let all_take = there().all(takes);
-            // Health reports are few: the link itself has room for those of a quarter of an hour.
+            // Health reports are rare: the link itself has room for those of a quarter of an hour.
             let may_block = match over {
                 Over::InProcess => return None,
                 Over::SharedMemory => audience.keep_all > 0 && kind != SampleKind::Health,
@@ -291,15 +290,15 @@ impl Planner<'_> {
             .collect()
     }
 
-    /// How long samples of this stage for other hosts wait for more.
+    /// Returns the batching interval of samples of this stage for other hosts \[ms\].
     fn gather_ms(&self, at: usize) -> u64 {
         let host = self.pipeline.stages[at].host.as_ref();
         let host = host.and_then(|host| self.pipeline.hosts.get(host));
         host.map_or(0, |host| host.gather_ms)
     }
 
-    /// Whether the source of this stage's samples loses nothing while it waits: it reads a file. What a program of
-    /// somebody else does is not known; it is waited for.
+    /// Returns whether the source of this stage's samples can wait without loss, because it reads a file. An external
+    /// program is assumed to be able to wait.
     fn source_can_wait(&self, at: usize) -> bool {
         let stage = &self.pipeline.stages[at];
         match (&stage.settings, stage.inputs.first()) {

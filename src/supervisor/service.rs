@@ -1,15 +1,15 @@
-//! What a service manager is told (`sd_notify(3)`): when the run is ready, how it fares, that it lives, and that it ends.
-//! Where none listens nothing is told.
+//! Notifications to a service manager (`sd_notify(3)`): readiness, status, watchdog and end of the run. Without a
+//! service manager none are sent.
 
 use std::time::Duration;
 
 use sd_notify::NotifyState;
 use tokio::time::Instant;
 
-/// The service that this run is, if it is one.
+/// State of the notifications.
 #[derive(Debug)]
 pub struct Service {
-    /// How often it must be told that the run lives; half of what systemd allows, as its manual asks for.
+    /// Interval of watchdog notifications: half of systemd's limit, as its manual recommends.
     beat_every: Option<Duration>,
     beat: Option<Instant>,
     ready: bool,
@@ -17,7 +17,7 @@ pub struct Service {
 }
 
 impl Service {
-    /// As systemd has started it.
+    /// Reads the watchdog limit that systemd has set.
     pub fn new() -> Self {
         Self {
             beat_every: sd_notify::watchdog_enabled().map(|limit| limit / 2),
@@ -27,8 +27,8 @@ impl Service {
         }
     }
 
-    /// The run has got so far. Called from the loop that looks after the stages: a loop that hangs tells nothing, and
-    /// systemd ends the run.
+    /// Sends the notifications that are due. Called from the supervisor's loop: if that hangs, no notification is
+    /// sent, and systemd ends the run.
     pub fn tell(&mut self, ready: bool, status: String, now: Instant) {
         if ready && !self.ready {
             self.ready = true;
@@ -49,12 +49,12 @@ impl Service {
     }
 }
 
-/// The run ends.
+/// Notifies that the run ends.
 pub fn ends() {
     send(&[NotifyState::Stopping]);
 }
 
 fn send(state: &[NotifyState<'_>]) {
-    // A manager that does not listen misses what it asked for; the run goes on.
+    // A failed notification does not affect the run.
     let _ = sd_notify::notify(state);
 }

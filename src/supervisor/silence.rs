@@ -1,19 +1,19 @@
-//! What is said of a stage that gets nothing it can use: at once, again when something else is wrong, now and then
-//! while it lasts, and when it is over.
+//! Reports on a stage that receives nothing usable: at once, again when the reason changes, at growing intervals
+//! while it lasts, and at its end.
 
 use std::time::{Duration, Instant};
 
 use tauscope_bus::Trouble;
 
-/// The same trouble is told again after this time, in short; from then on at twice the time before.
+/// Time after which trouble that lasts is reported again, in short; each further interval is twice the previous one.
 const FIRST_REMINDER: Duration = Duration::from_secs(30);
-/// But at least this often.
+/// Longest such interval.
 const LONGEST_REMINDER: Duration = Duration::from_mins(10);
 
-/// A source that gave nothing for so long is silent.
+/// Time without samples after which a source is treated as silent.
 const SILENT: Duration = Duration::from_secs(1);
 
-/// The trouble of one stage, as far as it was told.
+/// Reported trouble of one stage.
 #[derive(Debug, Default)]
 pub struct Silence {
     told: Option<Told>,
@@ -22,7 +22,7 @@ pub struct Silence {
 #[derive(Debug)]
 struct Told {
     trouble: Trouble,
-    /// Nothing came while it lasted.
+    /// Whether the stage was silent when the trouble was first reported.
     was_silent: bool,
     since: Instant,
     reminder: Instant,
@@ -30,8 +30,8 @@ struct Told {
 }
 
 impl Silence {
-    /// The trouble that is there now, if any, and for how long nothing has come: what is to be said, and
-    /// whether it is a warning.
+    /// Takes the current trouble, if any, and the time since the newest sample. Returns the text to report, if any,
+    /// and whether it is a warning.
     pub fn note(
         &mut self,
         trouble: Option<&Trouble>,
@@ -82,7 +82,7 @@ impl Silence {
         }
     }
 
-    /// The trouble that was told and is not over.
+    /// Returns the reported trouble that is not over.
     pub fn trouble(&self) -> Option<&Trouble> {
         self.told.as_ref().map(|told| &told.trouble)
     }
@@ -96,7 +96,7 @@ mod tests {
     fn trouble_is_told_once_then_seldom_and_its_end_is_told() {
         let start = Instant::now();
         let mut silence = Silence::default();
-        let trouble = Trouble::new("nobody publishes a/b");
+        let trouble = Trouble::new("no publisher of a/b");
         let mut said = Vec::new();
         for second in 3..100 {
             let silent_for = Duration::from_secs(second);
@@ -108,9 +108,9 @@ mod tests {
             }
         }
         let expected = [
-            "no usable sample for 3 s: nobody publishes a/b",
-            "still: nobody publishes a/b (33 s)",
-            "still: nobody publishes a/b (93 s)",
+            "no usable sample for 3 s: no publisher of a/b",
+            "still: no publisher of a/b (33 s)",
+            "still: no publisher of a/b (93 s)",
         ];
         assert_eq!(said, expected);
         let end = start + Duration::from_secs(100);

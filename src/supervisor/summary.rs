@@ -1,4 +1,4 @@
-//! What came of a run: a line for each stage and each link.
+//! Summary of a run: a line for each stage and each link.
 
 use std::path::PathBuf;
 
@@ -12,11 +12,11 @@ use super::local::Local;
 use crate::exit::Exit;
 use crate::plan::{Link, Over};
 
-/// Why a run ended.
+/// Reason for the end of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Ended {
-    /// Its sources came to their end, or a stage failed.
+    /// Its sources ended, or a stage failed.
     Completed,
     /// Ctrl-C or SIGTERM.
     Interrupted,
@@ -24,15 +24,14 @@ pub enum Ended {
     NoData,
 }
 
-/// What came of a run on this host.
+/// Summary of a run on this host.
 #[derive(Debug, Clone, Serialize)]
 pub struct Summary {
-    /// Why it ended.
+    /// Reason for its end.
     pub ended: Ended,
     /// The stages of this host, in the order of the pipeline.
     pub stages: Vec<StageSummary>,
-    /// The links of this host, by what their receiving ends counted; a link to another host by what
-    /// its sending end counted.
+    /// The links of this host, as counted by their receivers; links to other hosts, as counted by their senders.
     pub links: Vec<LinkSummary>,
 }
 
@@ -45,10 +44,10 @@ pub struct Summary {
 pub struct StageSummary {
     /// Its name.
     pub stage: String,
-    /// Whether it listens to nobody.
+    /// Whether it has no inputs.
     #[serde(skip)]
     is_source: bool,
-    /// Whether it ever said what it has done: a program that is not ours may not.
+    /// Whether it ever reported its counts; an external program may not.
     pub reported: bool,
     /// Samples that came in; for a source, those it read.
     pub received: u64,
@@ -56,48 +55,48 @@ pub struct StageSummary {
     pub emitted: u64,
     /// Samples lost on the way to it, and those it had to refuse.
     pub dropped: u64,
-    /// How often it was started again.
+    /// Number of restarts.
     pub restarts: u64,
     /// Whether it was given up.
     pub failed: bool,
-    /// Whether it did not end when it was told to, and was killed.
+    /// Whether it was killed because it did not end when asked to.
     pub killed: bool,
-    /// Whether it is a live source that died and came back: what its robot said meanwhile, nobody counted.
+    /// Whether it is a live source that was restarted: what its robot sent meanwhile is lost and not counted.
     pub unknown_loss: bool,
-    /// What kept it from getting anything it could use, to the end.
+    /// Reason why it received nothing usable, if it lasted to the end.
     pub trouble: Option<Trouble>,
     /// The files that a recorder completed last.
     pub files: Vec<PathBuf>,
-    /// How many files a recorder completed.
+    /// Number of files that a recorder completed.
     pub files_completed: u64,
 }
 
-/// One link. Its books balance: what was emitted was received or dropped, to the sample.
+/// One link. Emitted = received + dropped, to the sample.
 #[derive(Debug, Clone, Serialize)]
 pub struct LinkSummary {
-    /// The stage it comes from.
+    /// Sending stage.
     pub from: String,
-    /// The stage it goes to.
+    /// Receiving stage.
     pub to: String,
-    /// What it ran over.
+    /// Transport.
     pub over: Over,
-    /// Samples sent; where the sender is on another host, as far as the receiver knows.
+    /// Samples sent; if the sender is on another host, as far as the receiver knows.
     pub emitted: Option<u64>,
-    /// Samples received, where the receiver is here.
+    /// Samples received, if the receiver is on this host.
     pub received: Option<u64>,
-    /// Samples that did not arrive, or that the receiver had to refuse.
+    /// Samples that did not arrive, or that the receiver refused.
     pub dropped: u64,
-    /// Whether the receiver, where it is here, has heard the end of the stream: without it nobody knows what else was
-    /// sent.
+    /// Whether the receiver, if it is on this host, has received the end of the stream; if not, more samples may have
+    /// been sent.
     pub ended: Option<bool>,
-    /// Messages of somebody who is not the sender; they were refused.
+    /// Refused messages that are not from the sender.
     pub foreign: u64,
-    /// Samples that were received and never sent. There can be none: the counts are wrong then.
+    /// Samples received but never sent: more than 0 only if the counts are wrong.
     pub surplus: u64,
 }
 
 impl Summary {
-    /// Adds up what the stages have reported.
+    /// Sums up the reports of the stages.
     pub fn new(pipeline: &Pipeline, links: &[Link], stages: &[Local], ended: Ended) -> Self {
         let here = |at: usize| stages.iter().find(|stage| stage.at == at);
         let name = |at: usize| pipeline.stages[at].name.clone();
@@ -129,7 +128,7 @@ impl Summary {
         summary
     }
 
-    /// How the run ended.
+    /// Returns the outcome of the run.
     pub fn exit(&self) -> Exit {
         let stages = &self.stages;
         if self.ended == Ended::NoData || self.is_empty() || stages.iter().any(|it| it.failed) {
@@ -141,14 +140,14 @@ impl Summary {
         Exit::from_loss(dropped || !self.links.iter().all(whole))
     }
 
-    /// Whether the sources of this host, if there are any, all ended without a sample: then nothing was done.
+    /// Returns whether this host has sources and all of them ended without a sample, so that the run did nothing.
     fn is_empty(&self) -> bool {
         let mut sources = self.stages.iter().filter(|stage| stage.is_source);
         let is_there = self.stages.iter().any(|stage| stage.is_source);
         is_there && sources.all(|stage| stage.reported && stage.received == 0)
     }
 
-    /// As tables.
+    /// Formats the summary as tables, with warnings.
     pub fn table(&self) -> String {
         let mut stages = new(&["stage", "received", "emitted", "dropped", "restarts"]);
         for stage in &self.stages {
@@ -216,7 +215,7 @@ impl Summary {
         text
     }
 
-    /// What else nobody should miss.
+    /// Returns further warnings: no samples, uncounted losses, incomplete streams, refused messages, wrong counts.
     fn warnings(&self) -> Vec<String> {
         let mut lines = Vec::new();
         if self.is_empty() {
@@ -226,12 +225,12 @@ impl Summary {
         for stage in self.stages.iter().filter(|stage| stage.unknown_loss) {
             let name = &stage.stage;
             lines.push(format!(
-                "stage `{name}` died and came back: what its robot said meanwhile is lost, and not counted"
+                "stage `{name}` was restarted: samples that its robot sent meanwhile are lost and not counted"
             ));
         }
         for link in &self.links {
             let LinkSummary { from, to, .. } = link;
-            // Of one that failed that is no news.
+            // Not worth a warning if the receiver failed.
             let has_failed = |it: &StageSummary| it.stage == *to && it.failed;
             if link.ended == Some(false) && !self.stages.iter().any(has_failed) {
                 lines.push(format!(
@@ -255,7 +254,7 @@ impl Summary {
     }
 }
 
-/// The two ends of a link, as far as they are here.
+/// The ends of a link that are on this host.
 struct Books<'a> {
     sender: Option<&'a Local>,
     receiver: Option<&'a Local>,
@@ -263,7 +262,7 @@ struct Books<'a> {
 }
 
 impl Books<'_> {
-    /// What became of the samples; none for a link between other hosts.
+    /// Balances the counts of both ends; `None` for a link between other hosts.
     fn balance(&self) -> Option<LinkSummary> {
         let sender = self.sender.filter(|stage| stage.tally.is_known());
         let receiver = self.receiver.filter(|stage| stage.tally.is_known());
@@ -279,7 +278,7 @@ impl Books<'_> {
         };
         let dropped = match (&sent, heard) {
             (Some(sums), Some(_)) => sums.emitted.saturating_sub(counts.received),
-            // What another host received is known there; here, what it has not taken.
+            // The counts of a receiver on another host are not known here; those that it has not acknowledged are.
             (Some(sums), None) => sums.undelivered.min(sums.emitted),
             _ => counts.dropped(),
         };
@@ -300,7 +299,7 @@ impl Books<'_> {
         })
     }
 
-    /// What the receiver has counted, and whether the stream has ended, in all lives of its sender.
+    /// Returns the receiver's counts, and whether the stream has ended, over all incarnations of its sender.
     fn heard(&self, receiver: &Local) -> (ReceiverCounts, bool) {
         let is_it = |input: &tauscope_bus::seat::Input| input.stream == self.link.stream;
         let Some(place) = receiver.seat.inputs.iter().position(is_it) else {
@@ -318,7 +317,7 @@ impl StageSummary {
     fn new(stage: &Local, settings: &Settings) -> Self {
         let sums = stage.tally.sums();
         let inputs = stage.seat.inputs.iter().zip(&sums.inputs);
-        // Health reports come along with what is recorded; they are not what is asked for here.
+        // Health reports accompany the recorded samples, and are not counted here.
         let data = inputs.filter(|(input, _)| input.kind != SampleKind::Health);
         let mut received = data.map(|(_, counts)| counts.received).sum();
         if stage.seat.inputs.is_empty() {
@@ -342,7 +341,8 @@ impl StageSummary {
     }
 }
 
-/// Whether it listens to a robot, which does not wait for it; what an outside program does is not known.
+/// Returns whether a stage receives from a robot, which does not wait for it; of an external program this is not
+/// known.
 fn is_live_source(settings: &Settings) -> bool {
     match settings {
         Settings::Ingest(config) => {

@@ -1,16 +1,16 @@
-//! What a stage has done over all its lives.
+//! Counts of a stage over all its incarnations.
 
 use tauscope_bus::ReceiverCounts;
 use tauscope_bus::shell::{Account, InputReport, Report};
 
-/// The sum of the reports of all lives.
+/// Sum of the reports of all incarnations.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// Of the lives before this one.
+    /// Sums of earlier incarnations.
     before: Sums,
-    /// The newest report of this life.
+    /// Newest report of this incarnation.
     newest: Report,
-    /// Whether it ever reported.
+    /// Whether a report was ever received.
     heard: bool,
 }
 
@@ -19,24 +19,24 @@ pub struct Tally {
 pub struct Sums {
     /// Samples that went out.
     pub emitted: u64,
-    /// Samples that the stage had to refuse.
+    /// Samples that the stage refused.
     pub refused: u64,
-    /// Samples that those who keep all did not get.
+    /// Samples not delivered to receivers that keep all samples.
     pub undelivered: u64,
     /// Files that a recorder has completed.
     pub files_completed: u64,
-    /// Each input, in the order of the seat.
+    /// Counts of each input, in the order of the seat.
     pub inputs: Vec<ReceiverCounts>,
 }
 
 impl Tally {
-    /// Takes a report of this life.
+    /// Sets the newest report of this incarnation.
     pub fn note(&mut self, report: Report) {
         self.newest = report;
         self.heard = true;
     }
 
-    /// Takes what a stage that died had noted beyond its last report; its inputs come from these stages.
+    /// Adds the counts of a dead stage since its last report; `from` are the senders of its inputs.
     pub fn settle<'a>(&mut self, account: &Account, from: impl Iterator<Item = &'a str>) {
         let Self { newest, heard, .. } = self;
         *heard |= account.emitted > 0 || account.inputs.iter().any(|(it, _)| it.received > 0);
@@ -59,23 +59,23 @@ impl Tally {
         }
     }
 
-    /// The newest report of this life.
+    /// Returns the newest report of this incarnation.
     pub fn newest(&self) -> &Report {
         &self.newest
     }
 
-    /// Closes this life and returns its last report.
+    /// Ends this incarnation and returns its last report.
     pub fn end_life(&mut self) -> Report {
         self.before = self.sums();
         std::mem::take(&mut self.newest)
     }
 
-    /// Whether the stage ever said what it has done; a program that is not ours may not.
+    /// Returns whether the stage ever reported its counts; an external program may not.
     pub fn is_known(&self) -> bool {
         self.heard
     }
 
-    /// The sums over all lives.
+    /// Returns the sums over all incarnations.
     pub fn sums(&self) -> Sums {
         let mut sums = self.before.clone();
         sums.emitted += self.newest.emitted;
@@ -144,7 +144,7 @@ mod tests {
         let last = tally.end_life();
         assert_eq!((last.emitted, last.stamp_ns), (12, 77));
         assert_eq!(last.inputs[0].position, Some(position));
-        // One that died before it could report.
+        // A stage that died before its first report.
         tally.settle(&account, ["twin"].into_iter());
         assert_eq!(tally.newest().inputs[0].from, "twin");
         assert_eq!(

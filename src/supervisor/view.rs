@@ -1,4 +1,4 @@
-//! What people see of a run: lines, and on a terminal a table below them.
+//! Live output of a run: lines, and on a terminal a table below them.
 
 use std::time::{Duration, Instant};
 
@@ -8,58 +8,58 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::progress::draw_target;
 use crate::terminal;
 
-/// How much is told.
+/// Verbosity of the output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Verbosity {
     /// Warnings and errors.
     Quiet,
-    /// Also what begins, what is found, and now and then how it goes.
+    /// Also starts, findings, and a status line now and then.
     #[default]
     Normal,
-    /// Also how it goes every other second, and each step of the start.
+    /// Also a status line every 2 s, and each step of the start.
     Verbose,
 }
 
-/// The first line about how it goes comes after this time.
+/// Time before the first status line.
 const FIRST_LINE: Duration = Duration::from_secs(2);
-/// Further ones come this often.
+/// Interval of further status lines.
 const LINE_EVERY: Duration = Duration::from_secs(10);
-/// Or this often, where much is to be told.
+/// Interval of status lines if verbose.
 const LINE_EVERY_VERBOSE: Duration = Duration::from_secs(2);
-/// A table is drawn this often.
+/// Refresh interval of the table.
 const DRAW_EVERY: Duration = Duration::from_millis(500);
 
-/// How a stage fares.
+/// Status of a stage.
 #[derive(Debug, Clone)]
 pub struct Row {
     /// Its name.
     pub stage: String,
-    /// Samples that came in (for a source, that went out).
+    /// Received samples; for a source, emitted ones.
     pub received: u64,
-    /// How many come in a second.
+    /// Sample rate \[Hz\].
     pub rate_hz: f64,
-    /// How long ago the newest came, if any did.
+    /// Time since the newest sample; `None` before the first one.
     pub age: Option<Duration>,
     /// Samples lost or refused.
     pub dropped: u64,
-    /// How far a source of known length is, from 0 to 1.
+    /// Progress of a source of known length, from 0 to 1.
     pub fraction_done: Option<f64>,
-    /// What holds there: a mute, a contact. Empty for nothing of note.
+    /// Current condition, such as a mute or a contact; empty if there is none.
     pub holds: String,
 }
 
-/// What people see.
+/// Live output of a run.
 #[derive(Debug)]
 pub struct View {
     verbosity: Verbosity,
-    /// Below the lines, on a terminal.
+    /// Table below the lines, on a terminal.
     bar: Option<ProgressBar>,
     began: Instant,
     due: Instant,
 }
 
 impl View {
-    /// A view that tells so much.
+    /// Creates a view of this verbosity.
     pub fn new(verbosity: Verbosity, now: Instant) -> Self {
         let draws = terminal::can_redraw() && verbosity > Verbosity::Quiet;
         let bar = draws.then(|| {
@@ -82,7 +82,7 @@ impl View {
         }
     }
 
-    /// Says what must not be missed.
+    /// Prints a warning or an error.
     pub fn warn(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.suspend(|| eprintln!("{line}")),
@@ -90,21 +90,21 @@ impl View {
         }
     }
 
-    /// Says what begins, what ends, what is found.
+    /// Prints a start, an end or a finding, unless quiet.
     pub fn note(&self, line: &str) {
         if self.verbosity >= Verbosity::Normal {
             self.warn(line);
         }
     }
 
-    /// Says what only those want to know who ask for much.
+    /// Prints a detail, if verbose.
     pub fn detail(&self, line: &str) {
         if self.verbosity >= Verbosity::Verbose {
             self.warn(line);
         }
     }
 
-    /// Shows how it goes, where it is time to.
+    /// Shows the status of the stages, if due.
     pub fn show(&mut self, now: Instant, rows: impl FnOnce() -> Vec<Row>) {
         if now < self.due || self.verbosity == Verbosity::Quiet {
             return;
@@ -135,7 +135,7 @@ impl Drop for View {
     }
 }
 
-/// All stages in a line.
+/// Formats the status of all stages as a line.
 fn line(rows: &[Row]) -> String {
     let each = rows.iter().map(|row| {
         let mut text = format!("{} {}", row.stage, row.received);
@@ -157,7 +157,7 @@ fn line(rows: &[Row]) -> String {
     each.collect::<Vec<_>>().join("; ")
 }
 
-/// A row a stage.
+/// Formats the status as a table, with a row for each stage.
 fn table(rows: &[Row]) -> String {
     let mut table = Table::new();
     table

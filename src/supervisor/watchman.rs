@@ -1,4 +1,4 @@
-//! Looks four times a second who is silent, who does not begin and who does not end, and says so.
+//! Watchdog: polls every 250 ms for stages that are silent, hung, not ready or not terminating, and reports them.
 
 use std::time::Duration;
 
@@ -11,11 +11,12 @@ use super::patience::Overdue;
 use super::view::Row;
 use super::{Ended, Supervisor};
 
-/// A stage that hears another host is silent after this time; a source says itself when it is.
+/// Time without samples after which a stage with inputs from other hosts is treated as silent; a source reports its
+/// own silence.
 const SILENT_AFTER: Duration = Duration::from_secs(4);
-/// A stage that has not begun after this time waits for somebody.
+/// Time after which a stage that is not ready is reported.
 const BEGUN_WITHIN: Duration = Duration::from_secs(4);
-/// What is seen instead takes a source so long to find out: a run that ends for want of data waits for it.
+/// Time that a source needs to find the reason for missing data; a run that ends without data waits for it.
 const REASON_WITHIN: Duration = Duration::from_secs(5);
 
 impl Supervisor<'_> {
@@ -47,7 +48,7 @@ impl Supervisor<'_> {
                 self.remote_trouble(index, silent_for)
             };
             let stage = &mut self.stages[index];
-            // One whose process has just been started again has not said yet how it is.
+            // A process that was just restarted has not reported its state yet.
             if trouble.is_none() && stage.silence.trouble().is_some() && silent_for > SILENT_AFTER {
                 continue;
             }
@@ -63,7 +64,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Why a stage gets nothing all of whose inputs come from other hosts.
+    /// Returns the trouble of a silent stage whose inputs all come from other hosts.
     fn remote_trouble(&self, index: usize, silent_for: Duration) -> Option<Trouble> {
         let stage = &self.stages[index];
         let inputs = &self.pipeline.stages[stage.at].inputs;
@@ -114,7 +115,8 @@ impl Supervisor<'_> {
             .stages
             .iter()
             .filter(|stage| !stage.is_ready() && !stage.is_over());
-        // Readiness travels from the recorders to the sources: the last one in that order is who is waited for.
+        // Readiness propagates from the recorders to the sources: the stage nearest to the recorders holds up the
+        // others.
         let Some(stage) = waiting.next_back() else {
             return;
         };
@@ -142,7 +144,7 @@ impl Supervisor<'_> {
         ));
     }
 
-    /// Ends the run where `--expect-data` says so.
+    /// Ends the run if a source is silent for longer than `--expect-data` allows.
     fn end_without_data(&mut self, now: Instant) {
         let Some(limit) = self.care.expect_data else {
             return;
@@ -174,7 +176,7 @@ impl Supervisor<'_> {
         self.stop();
     }
 
-    /// Ends the run that lasts for so much data.
+    /// Ends the run after the requested duration of data.
     fn end_in_time(&mut self, now: Instant) {
         let mut sources = self.stages.iter().filter(|stage| stage.is_source());
         if self.first_sample.is_none() && sources.any(|stage| stage.flow.count() > 0) {
@@ -203,7 +205,7 @@ impl Supervisor<'_> {
                 Some(Overdue::Name(left)) => {
                     let left = left.as_secs_f64();
                     self.view.warn(&format!(
-                        "warning: stage `{name}` was told to end and still runs; it is killed in {left:.0} s"
+                        "warning: stage `{name}` was asked to end and still runs; it is killed in {left:.0} s"
                     ));
                 }
                 Some(Overdue::Kill) => self.kill_stubborn(index),

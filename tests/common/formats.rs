@@ -1,4 +1,4 @@
-//! A bundled recording's joint states, written again in other formats.
+//! Joint states of a bundled recording, written in other formats.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -16,13 +16,13 @@ use crate::common::bundled;
 
 const STATES: &str = "/joint_states";
 
-/// Joint states with the times at which they were recorded \[ns since the epoch\].
+/// Joint states with their times of recording \[ns since the epoch\].
 type States = Vec<(i64, JointState)>;
 
-/// What writes joint states into a folder, under this name without its ending.
+/// Function that writes joint states into a folder, under this name without its extension.
 pub type Format = fn(&Path, &str) -> PathBuf;
 
-/// The joint states of a bundled recording, named without its ending.
+/// Joint states of a bundled recording, named without its extension.
 fn states(name: &str) -> States {
     let recording = Recording::open(bundled().join(format!("{name}.mcap"))).unwrap();
     let mut read = recording.joint_states(STATES).unwrap();
@@ -34,7 +34,7 @@ fn states(name: &str) -> States {
     states
 }
 
-/// `sensor_msgs/msg/JointState` in MCAP: what the others are compared with.
+/// `sensor_msgs/msg/JointState` in MCAP: the reference for the other formats.
 pub fn mcap(folder: &Path, name: &str) -> PathBuf {
     let path = folder.join(format!("{name}.mcap"));
     let mut writer = McapWriter::create(&path, Compression::None, &BTreeMap::new()).unwrap();
@@ -128,7 +128,7 @@ pub fn lerobot(folder: &Path, name: &str) -> PathBuf {
     root
 }
 
-/// A bag of ROS 1: one chunk, not compressed.
+/// A bag of ROS 1 with one uncompressed chunk.
 pub fn ros1_bag(folder: &Path, name: &str) -> PathBuf {
     let states = states(name);
     let path = folder.join(format!("{name}.bag"));

@@ -11,7 +11,7 @@ use crate::common::{Out, bundled, write};
 
 const STATES: &str = "/joint_states";
 
-/// What a set is made of; recordings without a folder are the bundled ones.
+/// Files of a labelled set; recordings without a folder are the bundled ones.
 pub struct Set {
     pub robot: PathBuf,
     pub labels: Option<PathBuf>,
@@ -70,7 +70,8 @@ pub fn evaluate(set: &Path, out: &Path, more: &[&str]) -> Out {
     Out::answer(named.into_iter().chain(more.iter().map(OsStr::new)))
 }
 
-/// A copy of a bundled recording whose joint states went through `change`; those it says `false` to are gone.
+/// Copies a bundled recording with its joint states changed by `change`; those for which it returns `false` are
+/// removed.
 pub fn changed(
     folder: &Path,
     name: &str,

@@ -1,5 +1,5 @@
-//! A pipeline out of what `tauscope evaluate` has left behind: its `twin.yaml`, and each part of its `learnt.yaml` as
-//! a stage.
+//! A pipeline from the results of `tauscope evaluate`: its `twin.yaml`, and each part of its `learnt.yaml` as a
+//! stage.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -7,18 +7,18 @@ use std::sync::OnceLock;
 use crate::common::labelled_set::{Set, evaluate};
 use crate::common::{Out, bundled, tauscope, write};
 
-/// What a pipeline over the results of an evaluation is made of.
+/// Inputs of a pipeline over the results of an evaluation.
 pub struct LearntPipeline<'a> {
     /// The folder that `evaluate` wrote to.
     pub evaluated: &'a Path,
     pub robot: &'a Path,
     pub recording: &'a Path,
-    /// What the `twin` stage is told, in braces.
+    /// Settings of the `twin` stage, in braces.
     pub twin: Option<&'a str>,
 }
 
 impl LearntPipeline<'_> {
-    /// Writes `pipeline.yaml` into `folder`, with what was learnt gone through `change`.
+    /// Writes `pipeline.yaml` into `folder`, with the contents of `learnt.yaml` changed by `change`.
     pub fn write(&self, folder: &Path, change: impl Fn(&str) -> String) -> PathBuf {
         let Self {
             robot, recording, ..
@@ -84,7 +84,7 @@ fn evaluated() -> &'static Path {
     folder.path()
 }
 
-/// A pipeline of what was learnt there, over another recording or for another robot.
+/// A pipeline with these results, over another recording or for another robot.
 pub fn pipeline<'a>(
     robot: &'a Path,
     recording: &'a Path,
@@ -115,7 +115,7 @@ pub fn run(pipeline: &Path) -> Out {
     Out::of(command)
 }
 
-/// That all of this is said, in an error with exit code 2.
+/// Asserts exit code 2 and an error output that contains all of `said`.
 pub fn refused(out: &Out, said: &[&str]) {
     assert_eq!(out.code, 2, "{}\n{}", out.stdout, out.stderr);
     for said in said {

@@ -1,4 +1,4 @@
-//! A pipeline that is running.
+//! A running pipeline.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -8,14 +8,14 @@ use std::time::{Duration, Instant};
 
 use crate::common::tauscope;
 
-/// Slow machines run the tests, too; nothing waits this long where all is well.
+/// Generous timeout for slow machines; normally never reached.
 const PATIENCE: Duration = Duration::from_mins(1);
 
-/// `tauscope run`, heard line by line.
+/// `tauscope run`, with its output read line by line.
 pub struct Live {
     child: Child,
     lines: Receiver<String>,
-    /// What was heard so far.
+    /// Lines read so far.
     pub heard: Vec<String>,
 }
 
@@ -25,7 +25,7 @@ impl Live {
         Self::start_as(tauscope(), folder, more)
     }
 
-    /// The same, of a program with an environment of its own.
+    /// Runs `pipeline.yaml` in `folder` by a command with its own environment.
     pub fn start_as(mut command: Command, folder: &Path, more: &[&str]) -> Self {
         command
             .current_dir(folder)
@@ -88,19 +88,19 @@ impl Live {
         }
     }
 
-    /// All lines to the end of what it says.
+    /// All remaining lines of the output.
     pub fn rest(&mut self) -> String {
         let rest: Vec<String> = self.lines.iter().collect();
         rest.join("\n")
     }
 
-    /// The process of a stage that is about to be started.
+    /// Process id of a stage that is about to start.
     pub fn wait_for_stage(&mut self, stage: &str) -> u32 {
         let id = self.wait_for(&format!("stage `{stage}` runs as process "));
         id.parse().unwrap()
     }
 
-    /// Waits for its end: exit code (-1 for a signal) and summary.
+    /// Waits for the end of the run; returns exit code (-1 for a signal) and summary.
     pub fn end(mut self) -> (i32, serde_json::Value) {
         let deadline = Instant::now() + PATIENCE;
         let status = loop {
@@ -124,7 +124,7 @@ impl Live {
     }
 }
 
-/// A test that fails leaves nothing behind.
+/// Kills the process if a test fails.
 impl Drop for Live {
     fn drop(&mut self) {
         let _ = self.child.kill();
@@ -141,7 +141,7 @@ pub fn signal(process: u32, name: &str) {
     assert!(status.unwrap().success(), "no process {process}");
 }
 
-/// Whether the process is there (and more than the remains of one that nobody has waited for).
+/// Whether the process exists and is not a zombie.
 pub fn is_alive(process: u32) -> bool {
     let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
     let state = stat.rsplit(')').next().unwrap_or("").trim_start();
@@ -157,7 +157,7 @@ pub fn wait_until(what: &str, condition: impl Fn() -> bool) {
     }
 }
 
-/// A stage's line of the summary.
+/// Entry of a stage in the summary.
 pub fn stage<'a>(summary: &'a serde_json::Value, name: &str) -> &'a serde_json::Value {
     let stages = summary["stages"].as_array().unwrap();
     stages.iter().find(|stage| stage["stage"] == name).unwrap()

@@ -1,4 +1,4 @@
-//! What the tests of the whole program share.
+//! Helpers shared by the tests of the whole program.
 #![allow(
     dead_code,
     reason = "hostile.rs and faults.rs, programs of their own, use a part"
@@ -23,8 +23,8 @@ pub fn tauscope() -> Command {
     Command::new(env!("CARGO_BIN_EXE_tauscope"))
 }
 
-/// Hides from a cargo that is called by a test what this one says of the test's own package. The build script of ring
-/// asks for it: ring would be built again, and with it nearly all else.
+/// Removes the environment variables of the test's own package from a cargo command. The build script of ring reads
+/// them, so ring and nearly everything else would be built again.
 pub fn hide_own_package(command: &mut Command) {
     for (name, _) in std::env::vars_os() {
         let of_package = |name: &str| {
@@ -42,12 +42,12 @@ pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The recordings and robots that come with it.
+/// Folder of the bundled recordings and robots.
 pub fn bundled() -> PathBuf {
     root().join("tests/data")
 }
 
-/// Real recordings, if they are there. If not, says so where the test harness does not hide it.
+/// Folder of real recordings, if it exists. Otherwise reports the skipped test past the test harness.
 pub fn shared(test: &str) -> Option<PathBuf> {
     let shared = root().join("../shared");
     if shared.is_dir() {
@@ -57,7 +57,7 @@ pub fn shared(test: &str) -> Option<PathBuf> {
     None
 }
 
-/// Says that a test was not run, past the harness, which shows nothing of a test that passes.
+/// Reports a skipped test past the harness, which hides the output of passing tests.
 pub fn skipped(test: &str, why: &str) {
     let _ = writeln!(std::io::stderr(), "SKIPPED {test}: {why}");
 }
@@ -68,7 +68,7 @@ pub fn write(path: &Path, text: &str) -> PathBuf {
     path.to_owned()
 }
 
-/// What a command said and how it ended.
+/// Exit code and output of a command.
 #[derive(Debug)]
 pub struct Out {
     /// Exit code; -1 if a signal ended it.
@@ -80,7 +80,7 @@ pub struct Out {
 }
 
 impl Out {
-    /// What the program answers to these arguments, asked as a function: no process is started.
+    /// Runs the program with these arguments as a function, without starting a process.
     pub fn answer<A: Into<OsString>>(arguments: impl IntoIterator<Item = A>) -> Self {
         let tauscope::Answer {
             code,

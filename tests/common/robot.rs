@@ -1,4 +1,4 @@
-//! A robot on Zenoh: a router in this process, and publishers as ROS 2 would have them.
+//! A robot on Zenoh: a router in this process, and publishers like those of ROS 2.
 
 use std::net::TcpListener;
 use std::sync::Arc;
@@ -14,8 +14,8 @@ pub const JOINTS: [&str; 7] = [
     "joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "joint7",
 ];
 
-/// An endpoint that nobody listens on right now: below the ports that Linux gives to connections, so that none of those
-/// takes it in the meantime.
+/// An endpoint without a listener, below Linux's range of ephemeral ports, so that no connection takes the port in
+/// the meantime.
 pub fn endpoint() -> String {
     static NEXT: AtomicU16 = AtomicU16::new(0);
     loop {
@@ -27,7 +27,7 @@ pub fn endpoint() -> String {
     }
 }
 
-/// A router that listens there.
+/// Starts a router that listens there.
 pub fn router(endpoint: &str) -> Session {
     let mut config = zenoh::Config::default();
     for (key, value) in [
@@ -40,32 +40,32 @@ pub fn router(endpoint: &str) -> Session {
     zenoh::open(config).wait().unwrap()
 }
 
-/// The key of `rmw_zenoh`.
+/// Key of a topic in `rmw_zenoh`.
 pub fn rmw_key(domain: u32, topic: &str) -> String {
     let (dds_type, hash) = (ros::JointState::dds_type(), ros::JointState::TYPE_HASH);
     format!("{domain}/{topic}/{dds_type}/{hash}")
 }
 
-/// The token with which `rmw_zenoh` announces a publisher.
+/// Liveliness token by which `rmw_zenoh` announces a publisher.
 pub fn rmw_token(domain: u32, topic: &str) -> String {
     let (dds_type, hash) = (ros::JointState::dds_type(), ros::JointState::TYPE_HASH);
     let topic = topic.replace('/', "%");
     format!("@ros2_lv/{domain}/abc/0/10/MP/%/%/driver/%{topic}/{dds_type}/{hash}/::,7:,:,:,,")
 }
 
-/// Publishes joint states, a hundred a second, until it is dropped.
+/// Publishes joint states, a hundred per second, until it is dropped.
 pub struct Publisher {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Publisher {
-    /// Of these joints under this key.
+    /// Starts publishing these joints under this key.
     pub fn start(session: &Session, key: &str, joints: &[&str]) -> Self {
         Self::start_as(session, key, joints, None)
     }
 
-    /// The same, numbered and named as `rmw_zenoh` does.
+    /// Starts publishing with the sequence number and name that `rmw_zenoh` attaches.
     pub fn start_as(session: &Session, key: &str, joints: &[&str], id: Option<u8>) -> Self {
         let body = |joints: &[String]| {
             let now = SystemTime::now()
@@ -79,7 +79,7 @@ impl Publisher {
                 effort: zeros,
                 ..ros::JointState::default()
             };
-            // A sensor flickers; what stays the same to the last bit is told of.
+            // The effort must vary, because constant values are reported as a fault.
             state.effort[0] = f64::from(now.subsec_nanos()) * 1e-12;
             state.header.stamp.sec = now.as_secs() as i32;
             state.header.stamp.nanosec = now.subsec_nanos();
@@ -109,7 +109,7 @@ impl Publisher {
     }
 }
 
-/// Number, time and publisher, as `rmw_zenoh` attaches them.
+/// Attachment of `rmw_zenoh`: number, time and publisher.
 fn attachment(sequence: i64, publisher: u8) -> Vec<u8> {
     let mut bytes = sequence.to_le_bytes().to_vec();
     bytes.extend(0_i64.to_le_bytes());

@@ -1,4 +1,4 @@
-//! A controller of Universal Robots, as far as RTDE goes: it speaks the protocol's version 2 over a real socket.
+//! A simulated Universal Robots controller that implements RTDE version 2 over a real socket.
 #![allow(
     dead_code,
     clippy::unwrap_used,
@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// The outputs that it has, with their types.
+/// Its outputs, with their types.
 const OUTPUTS: [(&str, &str); 9] = [
     ("timestamp", "DOUBLE"),
     ("actual_q", "VECTOR6D"),
@@ -25,10 +25,10 @@ const OUTPUTS: [(&str, &str); 9] = [
     ("payload_inertia", "VECTOR6D"),
 ];
 
-/// What it measures at an instant.
+/// Measured values at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Instant {
-    /// Since the controller's start \[s\].
+    /// Time since the controller's start \[s\].
     pub timestamp_s: f64,
     pub position: [f64; 6],
     pub velocity: [f64; 6],
@@ -37,22 +37,22 @@ pub struct Instant {
     pub payload_kg: f64,
 }
 
-/// How it behaves.
+/// Settings of the simulated controller.
 #[derive(Debug, Clone)]
 pub struct Behaviour {
-    /// The version of the protocol that it accepts.
+    /// Accepted version of the protocol.
     pub version: u16,
-    /// Outputs that it does not have.
+    /// Missing outputs.
     pub without: Vec<&'static str>,
-    /// Bytes of each piece in which packages leave.
+    /// Bytes per piece in which packages are sent.
     pub piece: usize,
-    /// Whether data follow.
+    /// Whether data follows.
     pub sends: bool,
-    /// Instants after which it closes a connection.
+    /// Number of instants after which it closes a connection.
     pub closes_after: Option<usize>,
     /// Pause between instants.
     pub pause: Duration,
-    /// What it says instead of any answer.
+    /// Fixed reply instead of any answer.
     pub says: Option<&'static [u8]>,
 }
 
@@ -79,7 +79,7 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// On a free port.
+    /// Starts it on a free port.
     pub fn start(behaviour: Behaviour, instants: Vec<Instant>) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         Self::start_on(listener, behaviour, instants)
@@ -95,7 +95,7 @@ impl Controller {
             while !ours.load(Ordering::Relaxed) {
                 if let Ok((stream, _)) = listener.accept() {
                     stream.set_nonblocking(false).unwrap();
-                    // A client that goes away ends its connection.
+                    // A client that disconnects ends its connection.
                     let _ = serve(&stream, &behaviour, &instants, &place, &ours);
                 }
                 std::thread::sleep(Duration::from_millis(5));
@@ -109,7 +109,7 @@ impl Controller {
         }
     }
 
-    /// Instants that it has sent.
+    /// Number of instants sent.
     pub fn sent(&self) -> usize {
         self.next.load(Ordering::Relaxed)
     }
@@ -170,7 +170,7 @@ fn serve(
             break;
         }
     }
-    // As controllers do, a text comes in between.
+    // Like real controllers, it sends a text message in between.
     send(stream, behaviour, b'M', b"\x05hello\x04test\x03")?;
     if !behaviour.sends {
         std::thread::sleep(Duration::from_secs(3));

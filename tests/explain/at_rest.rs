@@ -1,4 +1,4 @@
-//! Pushes on an arm that holds still.
+//! Pushes on an arm at rest.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use tauscope_archive::ros::{Header, JointState};
 
 use super::{STATES, explain, record, report, robot};
 
-/// A recording of an arm that holds still and is pushed at a link with these forces at these times \[s\].
+/// Writes a recording of an arm at rest that is pushed at a link with these forces at these times \[s\].
 fn pushed(path: &Path, robot: &Path, link: &str, pushes: &[(f64, f64, [f64; 3])]) {
     use tauscope_dynamics::{Data, Model, forward_kinematics, gravity_effort, link_jacobian};
     let model = Model::from_urdf(&std::fs::read_to_string(robot).unwrap()).unwrap();
@@ -24,7 +24,7 @@ fn pushed(path: &Path, robot: &Path, link: &str, pushes: &[(f64, f64, [f64; 3])]
             let noise = |j: usize| 0.02 * (f64::from(k) * (1.7 + j as f64)).sin();
             let mut effort: Vec<f64> = (0..6).map(|j| load[j] + 0.3 + noise(j)).collect();
             for (from, to, force) in pushes {
-                // It grows and fades.
+                // The force grows and fades.
                 let share = ((t - from) / (to - from)).clamp(0.0, 1.0);
                 let now = (std::f64::consts::PI * share).sin();
                 for (j, effort) in effort.iter_mut().enumerate() {
@@ -46,7 +46,7 @@ fn pushed(path: &Path, robot: &Path, link: &str, pushes: &[(f64, f64, [f64; 3])]
     record(path, &[(STATES, &rows)]);
 }
 
-/// What is said of one recording of a robot.
+/// Report on one recording of a robot.
 fn explained(out: &Path, robot: &Path, recording: &Path) -> Value {
     let (robot, recording) = (robot.to_str().unwrap(), recording.to_str().unwrap());
     let done = explain(out, &["--robot", robot, "--fit", recording]);
@@ -59,7 +59,7 @@ fn pushes_on_an_arm_at_rest_are_told_in_time_and_place() {
     let folder = tempfile::tempdir().unwrap();
     let (robot, recording) = (robot("six"), folder.path().join("pushed.mcap"));
     let pushes = [
-        // In the first second, whose load is taken as usual.
+        // Within the first second, whose load is part of the baseline.
         (0.5, 1.2, [15.0, 5.0, -10.0]),
         (5.0, 5.8, [-8.0, 12.0, 6.0]),
         (8.0, 9.0, [3.0, -20.0, 9.0]),

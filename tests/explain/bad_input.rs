@@ -1,4 +1,4 @@
-//! Data that allows no verdict, rows that are lost, and what is refused.
+//! Data that allows no verdict, lost rows, and refused input.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use tauscope_archive::ros::JointState;
 use super::{case, changed, explain, explain_case, named, pair, report, robot, states};
 use crate::common::{Out, root, write};
 
-/// What data that allows no verdict gets: a reason, and exit code 0.
+/// Asserts that the data allows no verdict: a reason, and exit code 0.
 fn not_evaluated(out: &Path, done: &Out, reason: &str) {
     assert_eq!(done.code, 0, "{}", done.stderr);
     let report = report(out);
@@ -24,7 +24,7 @@ fn not_evaluated(out: &Path, done: &Out, reason: &str) {
 fn one_recording_that_is_too_short_to_be_parted_proves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    // Of an explanation before nothing may be left beside a report that names nothing.
+    // Files of an earlier explanation must not remain next to a report without findings.
     std::fs::create_dir(&out).unwrap();
     write(&out.join("report.json"), "{}");
     write(&out.join("twin.yaml"), "");
@@ -71,7 +71,8 @@ fn an_effort_that_is_zero_throughout_is_none() {
     not_evaluated(&out, &explain_case(&out, &zero), "effort is zero");
 }
 
-/// A fault of the recordings: a finding of this kind with these words, and no twin for a pipeline.
+/// Asserts that a fault of the recordings is a finding of this kind with these words, and that no twin for a pipeline
+/// is written.
 fn slip(name: &str, kind: &str, words: &[&str], change: impl Fn(usize, &mut JointState)) {
     let folder = tempfile::tempdir().unwrap();
     let case = changed(folder.path(), name, &[], change);
@@ -100,7 +101,7 @@ fn slip(name: &str, kind: &str, words: &[&str], change: impl Fn(usize, &mut Join
     let holds_in_a_pipeline = kind == "velocity_scale";
     assert_eq!(out.join("twin.yaml").exists(), holds_in_a_pipeline);
     assert!(!out.join("robot.urdf").exists());
-    // Predictions are of the columns as they were recorded.
+    // Predictions are for the columns as they were recorded.
     let after = report["holdout_rms_after"].as_array().unwrap();
     let before = report["holdout_rms_before"].as_array().unwrap();
     let sum = |all: &[Value]| all.iter().map(|x| x.as_f64().unwrap().powi(2)).sum::<f64>();
@@ -208,7 +209,7 @@ fn a_torn_tail_is_read_up_to_the_tear() {
     assert_eq!(named(&report(&out)), [pair("viscous_friction", "roll")]);
 }
 
-/// Arguments or files that are wrong: exit code 2 and these words.
+/// Asserts that wrong arguments or files give exit code 2 and these words.
 fn refused(done: &Out, words: &[&str]) {
     assert_eq!(done.code, 2, "{}", done.stderr);
     for word in words {
@@ -290,7 +291,7 @@ fn what_it_reads_is_not_overwritten() {
     let text = format!("{text}twin: {{model: out/twin.yaml}}\n");
     let again = write(&folder.path().join("case.yaml"), &text);
     refused(&explain_case(&out, &again), &["would overwrite"]);
-    // Elsewhere it is fine: nothing has changed since.
+    // In another folder it succeeds: nothing has changed since.
     let other = folder.path().join("other");
     let done = explain_case(&other, &again);
     assert_eq!(done.code, 0, "{}", done.stderr);

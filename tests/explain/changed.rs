@@ -1,4 +1,4 @@
-//! What changed since the twin of the unloaded arm was made, from motor currents that nobody can scale.
+//! Changes since the twin of the unloaded arm was made, from motor currents without torque constants.
 
 use std::path::PathBuf;
 
@@ -8,13 +8,13 @@ use super::simulated::simulate;
 use super::{explain, report};
 use crate::common::bundled;
 
-/// An arm whose joints rub, and the twin of it as it was.
+/// An arm with joint friction, and its initial twin.
 struct Arm {
     folder: tempfile::TempDir,
 }
 
 impl Arm {
-    /// Explains the arm as it is; the twin is kept.
+    /// Explains the arm in its initial state and keeps the twin.
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let arm = Self { folder };
@@ -27,7 +27,7 @@ impl Arm {
         self.folder.path().join(name)
     }
 
-    /// The report on recordings whose names begin with `name`, beside the twin of another report or not.
+    /// Report on recordings whose names begin with `name`, relative to the twin of another report if one is given.
     fn explained(&self, out: &str, name: &str, beside: Option<&str>) -> Value {
         let robot = bundled().join("demo_arm.urdf");
         let recordings = [0, 1, 2].map(|k| self.path(&format!("{name}{k}.mcap")));
@@ -43,7 +43,7 @@ impl Arm {
         report(&out)
     }
 
-    /// What is found in a scenario beside the twin of the arm as it was.
+    /// Findings in a scenario, relative to the twin of the arm in its initial state.
     fn changed(&self, name: &str, scenario: &str) -> Vec<Value> {
         simulate(self.folder.path(), scenario);
         let report = self.explained(name, name, Some("free"));
@@ -51,7 +51,7 @@ impl Arm {
     }
 }
 
-/// Friction is by a `share` of what it was; the second recording has `contacts`.
+/// Friction is multiplied by `share`; the second recording has `contacts`.
 fn scenario(name: &str, seed: u32, share: f64, physics: &str, contacts: &str) -> String {
     let friction = (1..=7).map(|j| {
         let (viscous, coulomb) = (2.4 * share / f64::from(j), 1.8 * share / f64::from(j));
@@ -94,7 +94,7 @@ fn what_an_arm_carries_is_weighed_in_amperes_too_beside_friction_that_fell() {
         low < 0.8 && 0.8 < high && high - low < 0.4,
         "{low} to {high} kg"
     );
-    // The joints have run in: nothing else but less friction than the twin says.
+    // The joints have run in: the only other findings are reductions of the twin's friction.
     for other in &others {
         let parameters = other["parameters"].as_object().unwrap();
         let plain = ["coulomb_friction", "viscous_friction"].map(Value::from);
@@ -106,7 +106,7 @@ fn what_an_arm_carries_is_weighed_in_amperes_too_beside_friction_that_fell() {
         assert!(sentence.contains("than the twin says"), "{sentence}");
     }
     assert!(!others.is_empty());
-    // All of it is in the new twin.
+    // The new twin contains all changes.
     let again = arm.explained("again", "loaded", Some("loaded"));
     assert_eq!(again["verdict"], "nothing_missing", "{}", again["findings"]);
 }

@@ -1,7 +1,7 @@
-//! `tauscope explain` through the program: what it says of arms whose secrets are known, what it leaves
-//! behind, and what it makes of bad input (`bad_input.rs`).
+//! `tauscope explain` as a program: its findings on arms with known hidden physics, its output files, and bad input
+//! (`bad_input.rs`).
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 mod at_rest;
 mod bad_input;
@@ -19,7 +19,7 @@ use tauscope_archive::{Compression, McapWriter, Recording};
 
 const STATES: &str = "/joint_states";
 
-/// A case of the small set, made by another engine.
+/// A case of the small set, simulated by another engine.
 fn case(name: &str) -> PathBuf {
     root().join("tests/proof/set/cases").join(name)
 }
@@ -29,7 +29,7 @@ fn robot(name: &str) -> PathBuf {
     root().join(file)
 }
 
-/// `tauscope explain` with these arguments, its results in `out`.
+/// Runs `tauscope explain` with these arguments, with its results in `out`.
 fn explain(out: &Path, arguments: &[&str]) -> Out {
     let arguments = ["explain", "--force"]
         .iter()
@@ -38,7 +38,7 @@ fn explain(out: &Path, arguments: &[&str]) -> Out {
     Out::answer(arguments.chain(["--out".as_ref(), out.as_os_str()]))
 }
 
-/// The same of a case file.
+/// Runs it on a case file.
 fn explain_case(out: &Path, case: &Path) -> Out {
     explain(out, &[case.to_str().unwrap()])
 }
@@ -91,8 +91,8 @@ fn record(path: &Path, topics: &[(&str, &[(i64, JointState)])]) {
     writer.finish().unwrap();
 }
 
-/// A copy of `name`'s case in `folder` with every row of the recordings in `which` changed; all of them if
-/// that is empty. The function is told the number of the row.
+/// Copies `name`'s case into `folder` with every row of the recordings in `which` changed; an empty `which` means
+/// all. The function receives the row number.
 fn changed(
     folder: &Path,
     name: &str,
@@ -133,7 +133,7 @@ fn a_viscous_joint_is_named_and_everything_is_left_behind() {
     assert_eq!(report["verdict"], "explained");
     assert_eq!(named(&report), [pair("viscous_friction", "roll")]);
     assert!(done.stdout.contains("viscous_friction"), "{}", done.stdout);
-    // What was concealed is in the interval, and the error falls to what the noise leaves.
+    // The interval contains the concealed value, and the error falls to the noise.
     let finding = &report["findings"][0];
     let found = finding["parameters"]["viscous_nms_per_rad"]
         .as_f64()
@@ -141,7 +141,7 @@ fn a_viscous_joint_is_named_and_everything_is_left_behind() {
     assert!((found - 1.9236).abs() < 0.02, "{found}");
     let rms = |key: &str| report[key][5].as_f64().unwrap();
     assert!(rms("holdout_rms_after") < 0.05 * rms("holdout_rms_before"));
-    // A row per recorded row, a column per joint, finite throughout; what is said of them is so.
+    // One row per recorded row, one column per joint, all finite; the reported error agrees with them.
     assert_eq!(report["holdout_predictions"]["rec_03"], "rec_03.csv");
     let rows: Vec<Vec<f64>> = std::fs::read_to_string(out.join("rec_03.csv"))
         .unwrap()
@@ -177,7 +177,7 @@ fn a_viscous_joint_is_named_and_everything_is_left_behind() {
             joints[j]
         );
     }
-    // Friction is nothing that a robot's description of bodies can hold.
+    // Friction cannot be stored in a robot's description of bodies.
     assert!(!out.join("robot.urdf").exists());
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("roll") && !page.contains("<script"));
@@ -272,7 +272,7 @@ fn drives_nobody_knows_are_scaled_by_gravity_and_inertia_within_their_intervals(
         .iter()
         .filter_map(Value::as_str)
         .collect();
-    // The interval of each drive holds what it is.
+    // The interval of each drive contains the true value.
     for (joint, constant) in &known {
         let start = format!("The drive of joint {joint} has ");
         let note = notes.iter().find(|note| note.starts_with(&start));
@@ -284,7 +284,7 @@ fn drives_nobody_knows_are_scaled_by_gravity_and_inertia_within_their_intervals(
             "{joint} {constant}: {ends:?}"
         );
     }
-    // What is said of lift is in N m although the recordings are in A.
+    // The numbers of lift are in N m although the recordings are in A.
     let finding = &report["findings"][0];
     let coulomb_nm = finding["parameters"]["coulomb_nm"].as_f64().unwrap();
     let interval = finding["intervals_95"]["coulomb_nm"].as_array().unwrap();
@@ -361,7 +361,7 @@ fn a_prediction_comes_from_the_motion_alone() {
 #[test]
 fn a_twin_on_a_topic_is_explained_without_a_robot() {
     let folder = tempfile::tempdir().unwrap();
-    // Somebody's twin that knows everything but what holds `turn` back.
+    // A given twin that contains everything except the friction of `turn`.
     let mut files = Vec::new();
     for name in ["rec_00", "rec_01", "rec_02", "rec_03"] {
         let measured = states(&case("m11").join(format!("{name}.mcap")));
@@ -371,7 +371,7 @@ fn a_twin_on_a_topic_is_explained_without_a_robot() {
             .map(|(log_ns, state)| {
                 let mut twin = state.clone();
                 for (at, joint) in state.name.iter().enumerate() {
-                    // Noise of its own: a sum of uniform numbers.
+                    // Independent noise: a sum of uniform numbers.
                     let mut noise = 0.0;
                     for _ in 0..4 {
                         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -1,4 +1,4 @@
-//! Several things at once, in the simulated cell.
+//! Several effects at once, in the simulated cell.
 
 use std::path::Path;
 
@@ -89,7 +89,7 @@ fn a_wall_and_something_carried_for_a_while_are_both_told_within_their_intervals
             Some("contact_wall") => &WALL[..],
             _ => &CARRIED[..],
         };
-        // Two of the inertias hardly show in this motion, and are those of a usual body.
+        // Two of the inertias hardly affect this motion, and have the values of a typical body.
         let shown = truth
             .iter()
             .filter(|(name, _)| !HARDLY_SHOWN.contains(name));
@@ -140,7 +140,7 @@ fn a_link_that_is_another_body_is_described_where_no_name_fits() {
     ];
     arguments.extend([r0.to_str().unwrap(), r1.to_str().unwrap()]);
     arguments.extend(["--holdout", r2.to_str().unwrap()]);
-    // Its mass and its centre are off, too: without these names a body is all that is left.
+    // Its mass and its centre differ, too: without these names a body is the only remaining hypothesis.
     arguments.extend([
         "--without",
         "link_mass",
@@ -171,13 +171,14 @@ fn a_link_that_is_another_body_is_described_where_no_name_fits() {
         rest.into_iter().all(|(after, noise)| *after < 1.2 * noise),
         "{after:?}"
     );
-    // The new twin and its URDF have the body.
+    // The new twin and its URDF contain the body.
     let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
     assert!(read("twin.yaml").contains("link_inertia"));
     assert_ne!(read("robot.urdf"), std::fs::read_to_string(&robot).unwrap());
 }
 
-/// The bundled arm with something of 0.3 kg at its tool and a finger that nobody records: a gripper that is not mounted.
+/// The bundled arm with a body of 0.3 kg at its tool and a finger that is not recorded: a gripper that is not
+/// mounted.
 fn with_gripper(folder: &Path) -> std::path::PathBuf {
     let body = |mass: f64, z: f64, inertia: f64| {
         format!(
@@ -228,7 +229,7 @@ fn a_gripper_of_the_urdf_that_is_not_mounted_is_told_with_its_mass() {
     );
     assert_eq!(found["parameters"]["kind"], "absent_tool");
     let [low, high] = [0, 1].map(|end| found["intervals_95"]["mass_kg"][end].as_f64().unwrap());
-    // The masses of the other bodies may be off, too.
+    // The masses of the other bodies may be wrong, too.
     assert!(
         low <= 0.3 && 0.3 <= high && high - low < 0.15,
         "{low} {high}"

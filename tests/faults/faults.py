@@ -359,7 +359,7 @@ def hang(program, folder, pause, seconds):
         time.sleep(pause)
         held.go_on()
         named = run.wait_for("stage `in_a` hangs") - begin
-        run.wait_for("stage `in_a` goes on")
+        run.wait_for("stage `in_a` responds again")
         code, summary = run.end()
     finally:
         run.process.kill()
@@ -536,7 +536,7 @@ def restarted(program, folder, place, seconds):
     check(far == 3, "exit code", far, "with", missing, "missing and", stated, "stated:", got)
     if place == 0:
         said = runs[1].text()
-        check("nobody knows what was on its way" in said, "nobody says that a sender was cut off:", said)
+        check("number of samples in transit is unknown" in said, "nobody says that a sender was cut off:", said)
     return (f"{whole} emitted by the last life, {there} in the archives, {taken['dropped']} stated as lost; "
             f"exits {near} and {far}")
 

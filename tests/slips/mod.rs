@@ -1,8 +1,8 @@
-//! The slips of a first day: a wrong file, a wrong name, a wrong unit. Each must end with the exit code that the README
-//! promises, and with words that name the place, the cause and the remedy. None may give a silent zero or take the
-//! place of a file. `tests/silence.rs` has those of a live run.
+//! Mistakes of a first day: a wrong file, a wrong name, a wrong unit. Each must end with the exit code in the README
+//! and with a message that names the place, the cause and the remedy. None may give a silent zero or overwrite a
+//! file. `tests/silence.rs` has those of a live run.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 mod arguments;
 mod data_sets;
@@ -14,14 +14,14 @@ use std::path::{Path, PathBuf};
 
 use crate::common::{Out, bundled};
 
-/// What somebody types, and what the answer must have. `@name` is a file of the [`Desk`].
+/// A command line, and required parts of its output. `@name` is a file of the [`Desk`].
 struct Slip {
     typed: &'static str,
     code: u8,
     says: &'static [&'static str],
 }
 
-/// A folder with files that people mix up.
+/// A folder with files that are easily confused.
 struct Desk {
     folder: tempfile::TempDir,
 }
@@ -82,7 +82,7 @@ stages:
         this
     }
 
-    /// LeRobot data sets: one of positions only, one of two episodes, and some that are broken.
+    /// LeRobot data sets: one with positions only, one with two episodes, and some that are broken.
     fn data_sets(&self) {
         let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("archive/tests/data/lerobot");
         let mut files = Vec::new();
@@ -125,7 +125,7 @@ stages:
         self.folder.path().join(name)
     }
 
-    /// Files and folders with their lengths: a slip must leave them as they are.
+    /// Files and folders with their lengths: a mistake must not change them.
     fn inventory(&self) -> Vec<(PathBuf, u64)> {
         let mut all = Vec::new();
         walk(self.folder.path(), &mut all);
@@ -155,7 +155,7 @@ fn walk(folder: &Path, all: &mut Vec<(PathBuf, u64)>) {
     }
 }
 
-/// Types every slip at a fresh desk and says all that were answered otherwise.
+/// Runs all command lines in a fresh folder and reports those with another answer.
 fn type_all(slips: &[Slip]) {
     let desk = Desk::new();
     let before = desk.inventory();
@@ -196,7 +196,7 @@ fn type_all(slips: &[Slip]) {
     );
 }
 
-/// A path that stands twice in a row, as errors that are handed up say it.
+/// A path that occurs twice in a row in an error message.
 fn doubled_path(said: &str) -> Option<&str> {
     said.lines().find(|line| {
         let mut parts = line.trim_start_matches("error: ").split(": ");

@@ -1,4 +1,4 @@
-//! Recordings whose values cannot be: made of a bundled one.
+//! Recordings with impossible values, made from a bundled one.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use tauscope_archive::{Compression, McapWriter, Recording};
 
 use super::{Slip, bundled, type_all};
 
-/// Writes a contact-free recording with its values changed by `spoil`, told the message's number.
+/// Writes a contact-free recording with its values changed by `spoil`, which receives the message's number.
 fn write(path: &Path, spoil: &dyn Fn(u64, &mut JointState)) {
     let recording = Recording::open(bundled().join("demo_train_sweep.mcap")).unwrap();
     let none = std::collections::BTreeMap::new();
@@ -31,7 +31,7 @@ fn scaled(values: &mut [f64], factor: f64) {
     }
 }
 
-/// Writes all of them into `folder`.
+/// Writes all recordings into `folder`.
 pub fn write_all(folder: &Path) {
     let write = |name: &str, spoil: &dyn Fn(u64, &mut JointState)| {
         write(&folder.join(name), spoil);
@@ -269,7 +269,7 @@ fn a_run_warns_once_of_what_cannot_be() {
         ("degrees.mcap", 0, "are in degrees"),
         ("turned.mcap", 0, "other sign than the twin's"),
         ("jump.mcap", 0, "the position of joint2 jumps by 1.50"),
-        // What cannot be used is lost.
+        // Unusable messages are lost.
         (
             "nan.mcap",
             3,
@@ -290,7 +290,7 @@ fn a_run_warns_once_of_what_cannot_be() {
     assert!(!sound.stderr.contains("WARN"), "{sound:?}");
 }
 
-/// A table is replayed as other commands read it: a file beside it says what its columns are.
+/// A table is replayed with the same column file that the other commands use.
 #[test]
 fn a_table_is_replayed() {
     let desk = super::Desk::new();

@@ -15,10 +15,10 @@ use tauscope_dynamics::Model;
 use crate::common::{Out, root, tauscope, write};
 
 const STATES: &str = "/joint_states";
-/// A joint moves from here on \[rad/s\].
+/// Speed above which a joint moves \[rad/s\].
 pub const MOVES_RAD_S: f64 = 0.02;
 
-/// An arm, and the payloads it may take up \[kg\].
+/// Arms, with the range of their payloads \[kg\].
 const ROBOTS: [(&str, Range<f64>); 3] = [
     ("tests/data/demo_arm.urdf", 0.4..2.0),
     ("tests/proof/robots/seven.urdf", 0.4..2.0),
@@ -26,14 +26,14 @@ const ROBOTS: [(&str, Range<f64>); 3] = [
 ];
 const RATES_HZ: [f64; 3] = [100.0, 500.0, 1000.0];
 
-/// What happens to the arm.
+/// A change of the arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Change {
-    /// \[N m\] more at a joint.
+    /// Additional friction at a joint \[N m\].
     Friction(usize, f64),
     /// A factor at a joint.
     Gain(usize, f64),
-    /// \[kg\] more.
+    /// Additional mass \[kg\].
     Payload(f64),
     Nothing,
 }
@@ -51,7 +51,7 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// Robots and rates take turns.
+    /// Robots and rates alternate.
     pub fn new(seed: u64) -> Self {
         let turn = seed as usize;
         let (file, payload_kg) = ROBOTS[turn % 3].clone();
@@ -81,7 +81,8 @@ impl Cell {
         &self.model.joints()[j].name
     }
 
-    /// What the URDF does not tell of: friction everywhere, more of it in the cold, a little of the bodies.
+    /// Physics that the URDF leaves out: friction in all joints, more of it in the cold, and small errors of the
+    /// bodies.
     pub fn physics(&mut self) -> Vec<Value> {
         let mut physics = Vec::new();
         for j in 0..self.model.dof() {
@@ -130,7 +131,7 @@ impl Cell {
             json!({"fourier": {"period_s": period_s, "harmonics": harmonics, "speed": speed, "acceleration_rad_s2": acceleration_rad_s2, "range": range}})
         } else {
             let rest_s = [0.0, self.within(0.1..0.8)];
-            // Some cells work through a list of points, some go where they never were.
+            // Some cells repeat a list of points, others never repeat a position.
             let mut points = json!({"speed": speed, "acceleration_rad_s2": acceleration_rad_s2, "range": range, "rest_s": rest_s});
             if self.rng.random_bool(0.5) {
                 points["through"] = json!(self.list(range));
@@ -166,7 +167,7 @@ impl Cell {
         json!({"link": self.model.links()[link].name, "force_n": force.map(|f| f / size * wanted), "t_on_s": t_on_s, "t_off_s": t_on_s + lasts_s})
     }
 
-    /// Simulates a recording of this physics, with coloured noise and what happens to the gain.
+    /// Simulates a recording of this physics, with coloured noise and changes of the gain.
     pub fn simulate(
         &mut self,
         folder: &Path,
@@ -193,7 +194,7 @@ impl Cell {
         coloured
     }
 
-    /// Adds coloured noise to the efforts, half as strong as the white one, and lets a gain step.
+    /// Adds coloured noise to the efforts, half as strong as the white one, and applies a step of the gain.
     fn colour(&mut self, from: &Path, to: &Path, change: Change, at_s: f64) {
         let mut writer = McapWriter::create(to, Compression::None, &BTreeMap::new()).unwrap();
         let topic = writer.add_topic::<JointState>(STATES).unwrap();
@@ -202,7 +203,7 @@ impl Cell {
         rows(from, |since_s, message| {
             let mut message = message.clone();
             for (j, coloured) in coloured.iter_mut().enumerate() {
-                // The sum of three is as good as normal.
+                // The sum of three is nearly normal.
                 let normal: f64 = (0..3).map(|_| self.within(-1.0..1.0)).sum();
                 *coloured = share * *coloured + (1.0 - share * share).sqrt() * normal;
                 let place = message
@@ -225,7 +226,7 @@ impl Cell {
         writer.finish().unwrap();
     }
 
-    /// A change: of friction, gain and payload in turn, with what the plant must know of it.
+    /// Draws a change, of friction, gain and payload in turn, with the corresponding physics of the plant.
     pub fn change(&mut self, at_s: f64, ends_s: f64, physics: &mut Vec<Value>) -> Change {
         match self.seed / 9 % 3 {
             0 => {
@@ -237,7 +238,7 @@ impl Cell {
                 };
                 let before = physics.iter_mut().find(is).unwrap();
                 let before_nm = before["parameters"]["coulomb_nm"].as_f64().unwrap();
-                // More of it mostly; less where somebody greased it.
+                // Mostly an increase; a decrease represents new grease.
                 let factor = if self.rng.random_bool(0.75) {
                     self.within(1.6..2.5)
                 } else {
@@ -281,8 +282,8 @@ impl Cell {
         }
     }
 
-    /// Root mean square of what a change of one joint adds to its effort, in units of the coloured noise, which
-    /// alone is there below the twin's low-pass; NaN of a payload.
+    /// Root mean square of the effort of a change of one joint, in units of the coloured noise, the only noise below
+    /// the twin's low-pass; NaN for a payload.
     pub fn strength(&self, change: Change, recording: &Path, at_s: f64) -> f64 {
         let (j, mut square, mut count) = match change {
             Change::Friction(j, _) | Change::Gain(j, _) => (j, 0.0, 0.0),
@@ -309,7 +310,7 @@ impl Cell {
     }
 }
 
-/// Runs a command that must succeed; what it printed.
+/// Runs a command that must succeed; returns its output.
 pub fn done(command: Command) -> String {
     let words = format!("{command:?}");
     let out = Out::of(command);

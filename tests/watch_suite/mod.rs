@@ -1,8 +1,8 @@
-//! The watch in many simulated cells, through the program: `simulate`, `calibrate` and `replay`. Arms of six
-//! and seven joints whose friction warms up, coloured noise, motions of all kinds, people who push; then a
-//! joint's friction steps, its gain steps, or the arm takes up or puts down a payload.
+//! The watch in many simulated cells, through the program: `simulate`, `calibrate` and `replay`. Arms of six and
+//! seven joints with friction that warms up, coloured noise, motions of all kinds, and pushes by people. Then a
+//! joint's friction or gain steps, or the arm picks up or puts down a payload.
 //!
-//! All of it, in release and over seeds of one's choice, with a table at the end:
+//! The whole suite, in release and over chosen seeds, with a table at the end:
 //!
 //! ```sh
 //! WATCH_SEEDS=1..100 cargo test --release --test program watch_suite::changes \
@@ -11,7 +11,7 @@
 //!     -- --ignored --nocapture
 //! ```
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 mod cell;
 
@@ -24,13 +24,13 @@ use cell::{Cell, Change, MOVES_RAD_S, done, rows};
 use rand::Rng;
 use serde_json::{Value, json};
 
-/// A change must be named within so much motion \[s\].
+/// Motion after a change within which it must be named \[s\].
 const WITHIN_S: f64 = 10.0;
-/// From so many times the coloured noise on a change of one joint must be told.
+/// Strength of a change of one joint, in units of the coloured noise, above which it must be reported.
 const CLEAR: f64 = 4.0;
 
 impl Cell {
-    /// What the watch says of a recording, beside a twin that is the URDF, or calibrated on a free recording.
+    /// Reports of the watch on a recording, with the URDF or a twin calibrated on a free recording.
     fn watch(&self, folder: &Path, recording: &Path, free: Option<&Path>) -> Vec<Said> {
         let mut twin = json!({});
         if let Some(free) = free {
@@ -68,7 +68,7 @@ impl Cell {
     }
 }
 
-/// What the watch said.
+/// A report of the watch.
 #[derive(Debug)]
 struct Said {
     kind: String,
@@ -128,7 +128,7 @@ impl Said {
     }
 }
 
-/// How long the arm was in motion between two times of a recording \[s\].
+/// Time that the arm moves between two times of a recording \[s\].
 fn motion_s(recording: &Path, rate_hz: f64, from_s: f64, to_s: f64) -> f64 {
     let mut moving = 0.0;
     rows(recording, |since_s, message| {
@@ -138,7 +138,7 @@ fn motion_s(recording: &Path, rate_hz: f64, from_s: f64, to_s: f64) -> f64 {
     moving / rate_hz
 }
 
-/// How a change was told.
+/// Result of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Told {
     Right,
@@ -147,8 +147,8 @@ enum Told {
     Missed,
 }
 
-/// What became of a cell: how its change was told, after how much motion \[s\], words that were false, and all
-/// in words.
+/// Result of a cell: that of its change, the motion before the report \[s\], the number of false reports, and a
+/// description.
 struct Outcome {
     told: Told,
     motion_s: f64,
@@ -169,7 +169,7 @@ fn run(seed: u64) -> (Change, Outcome) {
         let recording = json!({"name": "free", "duration_s": 25, "motion": cell.motion()});
         cell.simulate(folder, &physics, &recording, Change::Nothing, 0.0)
     });
-    // Some have long been watched by then, some hardly.
+    // Some cells have been observed for long at this point, others hardly.
     let at_s = if seed.is_multiple_of(2) {
         cell.within(48.0..55.0)
     } else {
@@ -219,7 +219,7 @@ fn run(seed: u64) -> (Change, Outcome) {
     )
 }
 
-/// The seeds that the environment asks for.
+/// Seeds from the environment.
 fn seeds(default: Range<u64>) -> Range<u64> {
     let Ok(text) = std::env::var("WATCH_SEEDS") else {
         return default;
@@ -250,7 +250,7 @@ fn changes_are_named_at_their_places() {
         if is_right {
             delays_s.push(outcome.motion_s);
         }
-        // Of what hardly stands out of the noise nothing is asked but that no other name is given.
+        // For a change that is weak relative to the noise, the only requirement is that no wrong name is reported.
         if outcome.strength.is_nan() || outcome.strength >= CLEAR {
             all += 1;
             right += usize::from(is_right);
@@ -266,7 +266,7 @@ fn changes_are_named_at_their_places() {
     assert_eq!(false_words, 0);
 }
 
-/// Clean recordings of some hours, one a seed.
+/// Contact-free recordings of some hours, one per seed.
 #[test]
 #[ignore = "takes minutes"]
 fn clean_hours_raise_nothing() {

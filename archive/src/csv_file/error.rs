@@ -1,4 +1,4 @@
-//! What is wrong in a table, and where.
+//! Errors in CSV tables, with file and line.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// Tuned: by eye, for the length of the message.
 const SHOWN_CHARS: usize = 40;
 
-/// What is wrong in a table, and where.
+/// An error in a CSV table, with its file and line.
 #[derive(Debug, thiserror::Error)]
 #[error("{}:{line}: {problem}", path.display())]
 pub struct CsvError {
@@ -14,32 +14,32 @@ pub struct CsvError {
     pub path: PathBuf,
     /// The line, from 1.
     pub line: u64,
-    /// What is wrong.
+    /// The problem in that line.
     pub problem: CsvProblem,
 }
 
-/// What is wrong in a line of a table.
+/// A problem in a line of a CSV table.
 #[derive(Debug, thiserror::Error)]
 pub enum CsvProblem {
-    /// Not as many columns as the first line has.
+    /// A number of columns that differs from that of the first line.
     #[error("{found} columns, the lines before have {expected}")]
     Width {
-        /// Columns here.
+        /// Number of columns in this line.
         found: usize,
-        /// Columns there.
+        /// Number of columns in the first line.
         expected: usize,
     },
-    /// Not a number.
+    /// A cell that is not a number.
     #[error("column {column} ({what}): {text:?} is not a number")]
     NotANumber {
         /// The column, from 1.
         column: usize,
-        /// What the mapping takes it for.
+        /// Quantity and joint that the mapping assigns to the column.
         what: String,
-        /// What stands there, shortened.
+        /// Text of the cell, shortened.
         text: String,
     },
-    /// No time from zero to what a stamp can hold.
+    /// A time that is not a number or is outside the range of a ROS stamp.
     #[error(
         "column {column} (time): {text:?} is not a time from 0 to {:e} s",
         super::limits::TIME_S
@@ -47,17 +47,17 @@ pub enum CsvProblem {
     Time {
         /// The column, from 1.
         column: usize,
-        /// What stands there, shortened.
+        /// Text of the cell, shortened.
         text: String,
     },
-    /// No date, in a table whose first time is a date.
+    /// A time that is not a date, in a table whose first time is a date.
     #[error(
         "column {column} (time): {text:?} is not a date and time such as 2026-11-28T20:20:24.123Z, from 1970 to 2038"
     )]
     Date {
         /// The column, from 1.
         column: usize,
-        /// What stands there, shortened.
+        /// Text of the cell, shortened.
         text: String,
     },
     /// A time before the one in the line above.
@@ -70,7 +70,7 @@ pub enum CsvProblem {
         /// The time above \[s\].
         before_s: f64,
     },
-    /// All rows have one time.
+    /// Identical times in all rows.
     #[error(
         "column {column} (time): all {rows} rows have the time {time_s} s: the clock stands still"
     )]
@@ -82,7 +82,7 @@ pub enum CsvProblem {
         /// Their time \[s\].
         time_s: f64,
     },
-    /// A quotation mark without its second one.
+    /// An unclosed quotation mark.
     #[error("{}: a cell begins with a quotation mark, and the second mark is missing", place(*column))]
     OpenQuote {
         /// The column, from 1; `None` if it is not known.
@@ -91,7 +91,7 @@ pub enum CsvProblem {
     /// A line longer than any table of joints.
     #[error("a line of more than {limit} bytes: this is not a table")]
     LineTooLong {
-        /// What it may be at most \[bytes\].
+        /// Maximum length of a line \[bytes\].
         limit: usize,
     },
 }
@@ -103,7 +103,7 @@ fn place(column: Option<usize>) -> String {
     )
 }
 
-/// A piece of a table as an error shows it.
+/// Shortens a piece of a table for an error message.
 pub(super) fn shown(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let mut chars = text.chars();

@@ -9,15 +9,15 @@ use super::records::Records;
 use super::{Column, Columns, CsvMapping};
 use crate::error::ArchiveError;
 
-/// Ending of the file beside a table `NAME.csv` that holds its mapping: `NAME.columns.yaml`.
+/// Extension of the mapping file of a table: `NAME.columns.yaml` next to `NAME.csv`.
 const BESIDE: &str = "columns.yaml";
-/// Most header cells that an error shows.
+/// Maximum number of header cells in an error message.
 /// Chosen: those of a table of six joints.
 const SHOWN_CELLS: usize = 20;
 
 /// A recorder whose header is known.
 struct Recorder {
-    /// Who writes such tables.
+    /// Program that writes such tables, as worded in remarks.
     name: &'static str,
     time: &'static str,
     time_unit_ns: u64,
@@ -28,7 +28,7 @@ struct Recorder {
     joints: &'static [&'static str],
 }
 
-/// Those that are known.
+/// The known recorders.
 const RECORDERS: [Recorder; 2] = [
     // UniversalRobots/RTDE_Python_Client_Library, rtde/csv_writer.py. `actual_current` is in A.
     Recorder {
@@ -101,7 +101,7 @@ impl Recorder {
     }
 }
 
-/// The file beside the table at `path` that holds its mapping, there or not.
+/// Returns the path of the mapping file of the table at `path`, whether or not the file exists.
 fn beside(path: &Path) -> PathBuf {
     path.with_extension(BESIDE)
 }
@@ -175,7 +175,7 @@ fn names(header: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+    #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
     use super::*;
     use crate::Recording;

@@ -152,8 +152,8 @@ fn unquoted(cell: &[u8]) -> &[u8] {
 
 /// The delimiter of a table that begins with `head`.
 ///
-/// It stands as often in the first record as in the second. A table in which none of the others
-/// stands is separated by spaces.
+/// It occurs equally often in the first and the second record. A table without any other delimiter is separated by
+/// spaces.
 fn recognised_delimiter(head: &[u8]) -> u8 {
     let mut is_quoted = false;
     let records = head.split(|&byte| {

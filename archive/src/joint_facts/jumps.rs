@@ -1,44 +1,45 @@
-//! Positions that jump: steps between two samples that the recorded velocity does not explain, as an encoder makes
-//! them that loses count, or a position that wraps after a whole turn.
+//! Detection of position jumps: steps between two samples that the recorded velocity does not explain. They occur
+//! when an encoder loses count, or when a position wraps after a whole turn.
 
 use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-/// Longer steps are not judged \[ns\].
+/// Longest time between two samples in which a jump is detected \[ns\].
 /// Physical: in 50 ms a velocity that changes by 10 rad/s² between two samples misses the step by 2 mrad.
 const LONGEST_STEP_NS: i64 = 50_000_000;
-/// Smaller steps are no jumps \[rad or m\].
+/// Smallest residual of a jump \[rad or m\].
 /// Physical: fifty steps of a coarse encoder of 6000 steps per turn.
 const SMALLEST: f64 = 0.05;
-/// A jump is so many times as large as what the velocity misses other steps by, on average.
-/// Physical: positions in degrees miss by about the speed at every step, a jump stands alone.
+/// Smallest ratio of the residual of a jump to the mean residual of the other steps.
+/// Physical: with positions in degrees, every step has a residual of about the speed, while a jump is isolated.
 const TIMES: f64 = 20.0;
-/// Jumps that are kept at most.
+/// Maximum number of jumps kept.
 /// Resolution: memory; more of them are a fault of another kind.
 const KEPT: usize = 8;
-/// A jump back within this time belongs to the one before \[ns\].
+/// Longest time between a jump and the jump back \[ns\].
 /// Physical: an encoder's glitch lasts for some samples.
 const BACK_NS: i64 = 500_000_000;
-/// Two jumps of opposite sign and a whole turn are recognised to this share.
-/// Physical: what an arm moves beside the jump.
+/// Relative tolerance to which a jump back has the size of the jump.
+/// Physical: the motion of the arm during the jump.
 const ALIKE: f64 = 0.1;
-/// See [`ALIKE`].
+/// Relative tolerance to which a jump is a whole number of turns.
+/// Physical: the motion of the arm during the jump.
 const LIKE_A_TURN: f64 = 0.02;
 
 /// A jump of a position.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Jump {
-    /// From the first message of the topic to the first sample behind the jump \[s\].
+    /// Time of the first sample after the jump, from the first message of the topic \[s\].
     pub at_s: f64,
-    /// What the position changes by beyond what the velocity explains \[rad or m\].
+    /// Residual: change of the position minus the integral of the velocity \[rad or m\].
     pub by: f64,
-    /// After this time it jumps back \[s\]; `None` if it stays there.
+    /// Time until it jumps back \[s\]; `None` if it does not.
     pub lasts_s: Option<f64>,
 }
 
 impl Jump {
-    /// Where it is and how large.
+    /// Describes its size and its time.
     pub fn in_words(&self) -> String {
         let (by, at_s) = (self.by, self.at_s);
         let mut text = format!("by {by:.3} rad or m at {at_s:.3} s");
@@ -53,7 +54,7 @@ impl Jump {
     }
 }
 
-/// What a span of the comparison of position and velocity adds to its sums.
+/// Contribution of one span to the sums of the comparison of position and velocity.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Span {
     /// Position change squared.
@@ -72,24 +73,27 @@ impl Span {
     }
 }
 
-/// The suspects of one joint, with memory for some.
+/// Suspected jumps of one joint, at most [`KEPT`].
+///
+/// The residual of a step is the change of the position minus the integral of the velocity.
 #[derive(Debug, Default)]
 pub(super) struct Jumps {
-    /// What the velocity misses a step by, and the stamp of the sample behind it; the largest first.
+    /// Residual of a step and stamp of the sample after it \[ns\], largest first.
     suspects: Vec<(f64, i64)>,
-    /// Suspects that there was no room for.
+    /// Number of suspects that were dropped.
     further: u64,
-    /// Spans that hold suspects, with the largest miss in each; the largest first.
+    /// Spans with suspects and the largest residual in each, largest first.
     spans: Vec<(f64, Span)>,
-    /// The largest miss in the span that goes on, if that is a suspect.
+    /// Largest residual of the suspects in the current span, if any.
     in_span: Option<f64>,
-    /// Sum of the misses of all steps, and their number.
+    /// Sum of the absolute residuals of all steps.
     missed: f64,
+    /// Number of steps.
     steps: u64,
 }
 
 impl Jumps {
-    /// Takes a step that took `step_ns` up to `stamp_ns`, and which the velocity misses by `miss` \[rad or m\].
+    /// Adds a step of duration `step_ns` that ends at `stamp_ns` and has the residual `miss` \[rad or m\].
     pub fn step(&mut self, stamp_ns: i64, step_ns: i64, miss: f64) {
         if !(1..=LONGEST_STEP_NS).contains(&step_ns) {
             return;
@@ -108,7 +112,8 @@ impl Jumps {
         }
     }
 
-    /// A span has ended: gives what of it, or of those before, may be added to the sums for good.
+    /// Ends the current span, and keeps it if it has suspects. Returns the span to add to the sums: this one if it
+    /// has no suspects, or the one with the smallest residual if more than [`KEPT`] are kept.
     pub fn end_span(&mut self, span: Span) -> Option<Span> {
         let Some(largest) = self.in_span.take() else {
             return Some(span);
@@ -121,12 +126,12 @@ impl Jumps {
             .map(|(_, span)| span)
     }
 
-    /// The comparison begins anew.
+    /// Restarts the comparison with an empty span.
     pub fn begin_span(&mut self) {
         self.in_span = None;
     }
 
-    /// From which miss on a step is a jump \[rad or m\].
+    /// Returns the smallest residual that is a jump \[rad or m\].
     fn least(&self) -> f64 {
         let of_suspects: f64 = self.suspects.iter().map(|(miss, _)| miss.abs()).sum();
         let others = self.steps - self.suspects.len() as u64;
@@ -134,7 +139,7 @@ impl Jumps {
         SMALLEST.max(TIMES * usual)
     }
 
-    /// What spans without a jump add to the sums.
+    /// Returns the sums over the kept spans without a jump.
     pub fn without_jump(&self) -> Span {
         let least = self.least();
         let mut sum = Span::default();
@@ -144,7 +149,7 @@ impl Jumps {
         sum
     }
 
-    /// The jumps in their order, times from `first_ns` on, and whether there are more of them.
+    /// Returns the jumps in the order of time, relative to `first_ns`, and whether some were dropped.
     pub fn found(&self, first_ns: i64) -> (Vec<Jump>, bool) {
         let least = self.least();
         let mut jumps: Vec<(f64, i64)> = self.suspects.clone();

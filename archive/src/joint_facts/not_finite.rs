@@ -1,4 +1,4 @@
-//! Values of a joint that are no finite numbers: which, how many, and from when on.
+//! Values of a joint that are NaN or infinite: their field, number and times.
 
 use std::fmt;
 
@@ -12,26 +12,26 @@ pub const FIELDS: [&str; 3] = ["position", "velocity", "effort"];
 pub struct NotFinite {
     /// `position`, `velocity` or `effort`.
     pub field: &'static str,
-    /// In so many messages.
+    /// Number of messages in which it is not finite.
     pub messages: u64,
-    /// Of so many that have the field.
+    /// Number of messages that have the field.
     pub of: u64,
     /// Whether some of these values are infinite.
     pub infinite: bool,
-    /// From the first message of the topic to the first of these \[s\].
+    /// Time of the first value that is not finite, from the first message of the topic \[s\].
     pub first_s: f64,
-    /// From the first message of the topic to the last of these \[s\].
+    /// Time of the last value that is not finite, from the first message of the topic \[s\].
     pub last_s: f64,
 }
 
 impl NotFinite {
-    /// What is wrong with the joint of this name.
+    /// Describes the fault, with the name of the joint.
     pub fn in_words(&self, joint: &str) -> String {
         format!("the {} of {joint} {self}", self.field)
     }
 }
 
-/// Which values, how many and from when on: `is NaN in 12 messages from 3.200 s to 3.310 s`.
+/// Kind, number and times of the values: `is NaN in 12 messages from 3.200 s to 3.310 s`.
 impl fmt::Display for NotFinite {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (count, first_s, last_s) = (self.messages, self.first_s, self.last_s);
@@ -51,18 +51,18 @@ impl fmt::Display for NotFinite {
     }
 }
 
-/// Counts the values of one field of one joint.
+/// Running counts of one field of one joint.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct FieldTally {
     given: u64,
     bad: u64,
     infinite: bool,
-    /// Stamps of the first and the last bad one \[ns\].
+    /// Stamps of the first and the last value that is not finite \[ns\].
     span_ns: (i64, i64),
 }
 
 impl FieldTally {
-    /// Takes a value; whether it is the first that is not finite.
+    /// Adds a value. Returns whether it is the first that is not finite.
     pub fn add(&mut self, stamp_ns: i64, value: f64) -> bool {
         self.given += 1;
         if value.is_finite() {
@@ -77,12 +77,12 @@ impl FieldTally {
         self.bad == 1
     }
 
-    /// Whether values came and none of them was finite.
+    /// Returns whether there were values and none of them was finite.
     pub fn is_never_finite(&self) -> bool {
         self.given > 0 && self.bad == self.given
     }
 
-    /// What was not finite, times from `first_ns` on; `None` if all was.
+    /// Returns the summary, with times relative to `first_ns`; `None` if all values were finite.
     pub fn found(&self, field: &'static str, first_ns: i64) -> Option<NotFinite> {
         let since = |ns: i64| (ns - first_ns) as f64 * 1e-9;
         (self.bad > 0).then(|| NotFinite {

@@ -1,4 +1,4 @@
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use super::*;
 use crate::ros::{Header, Time};
@@ -59,7 +59,7 @@ fn repeats_and_stamps_that_step_back_are_counted() {
     assert_eq!((tallies.repeated, tallies.backward), (1, 1));
 }
 
-/// A joint that swings at 100 Hz, at whose samples something is done.
+/// A swinging joint sampled at 100 Hz, with `change` applied to each sample.
 fn swing_with(change: impl Fn(u32, &mut JointState)) -> JointFacts {
     let mut tallies = JointTallies::default();
     for i in 0..1000_u32 {

@@ -6,14 +6,14 @@ use serde::Serialize;
 
 use crate::ros::JointState;
 
-/// A joint that messages name more than once: which of its values hold, nobody knows.
+/// A joint that messages name more than once, so that its values are ambiguous.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Twice {
     /// Its name.
     pub joint: String,
-    /// Where it stands in the first of these messages, counted from 1.
+    /// Its first two entries in the first of these messages, counted from 1.
     pub entries: [usize; 2],
-    /// How many messages name a joint more than once.
+    /// Number of messages that name a joint more than once.
     pub messages: u64,
 }
 
@@ -32,17 +32,17 @@ impl fmt::Display for Twice {
     }
 }
 
-/// Looks for such messages.
+/// Detector of such messages.
 #[derive(Debug, Default)]
 pub(super) struct TwiceTally {
-    /// The first, and how many there are.
+    /// The first such joint, and the number of messages.
     pub found: Option<Twice>,
-    /// Whether the newest message is one.
+    /// Whether the newest message names a joint more than once.
     is_newest: bool,
 }
 
 impl TwiceTally {
-    /// Takes a message; one with the names of the message before need not be searched.
+    /// Adds a message. It is not searched again if it has the same names as the preceding one (`is_like_before`).
     pub fn add(&mut self, state: &JointState, is_like_before: bool) {
         if !is_like_before {
             let entries = state.named_twice();

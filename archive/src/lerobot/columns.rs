@@ -1,4 +1,4 @@
-//! The file beside a data set that says what its names do not.
+//! The file next to a data set that describes its columns where their names do not.
 
 use std::path::{Path, PathBuf};
 
@@ -8,10 +8,10 @@ use crate::csv_file::Columns;
 use crate::error::ArchiveError;
 use crate::lerobot_error::{LerobotError, LerobotProblem};
 
-/// Ending of the file beside a data set `DATASET`: `DATASET.columns.yaml`, as beside a table.
+/// Extension of the columns file of a data set: `DATASET.columns.yaml`, as for a CSV table.
 const BESIDE: &str = "columns.yaml";
 
-/// What it says; all of it may be left out.
+/// Contents of the columns file; every key is optional.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct ColumnsFile {
@@ -25,10 +25,10 @@ pub(super) struct ColumnsFile {
 }
 
 impl ColumnsFile {
-    /// Where the one of the data set in the folder `root` lies, there or not.
+    /// Returns the path of the columns file of the data set in the folder `root`, whether or not the file exists.
     pub(super) fn path(root: &Path) -> PathBuf {
         let named = root.file_name().map(|_| root.to_owned());
-        // `.` and `..` have a name once they are followed.
+        // `.` and `..` have no name until they are resolved.
         let root = named.or_else(|| root.canonicalize().ok());
         let root = root.unwrap_or_else(|| PathBuf::from("dataset"));
         let mut name = root.file_name().unwrap_or_default().to_owned();
@@ -37,7 +37,7 @@ impl ColumnsFile {
         root.with_file_name(name)
     }
 
-    /// Reads it, if it is there.
+    /// Reads the columns file, if it exists.
     pub(super) fn beside(root: &Path) -> Result<Self, ArchiveError> {
         let path = Self::path(root);
         if !path.exists() {

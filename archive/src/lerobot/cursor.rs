@@ -11,25 +11,25 @@ use crate::lerobot_error::{LerobotError, LerobotProblem};
 use crate::parquet_file::{Physical, Rows};
 use crate::ros::{self, JointState, Time};
 
-/// A timestamp that is no farther from the row's place on the grid of the rate is taken for it \[s\].
+/// Largest deviation of a timestamp from the grid of the frame rate that is rounded to the grid \[s\].
 /// Physical: LeRobot refuses sets that are farther off (`tolerance_s`); a `float32` has steps of 0.06 ms after ten
 /// minutes.
 const TOLERANCE_S: f64 = 1e-4;
 const NS_PER_S: f64 = 1e9;
 
-/// Reads one row at a time. Memory is a page of each column.
+/// Cursor over the rows of an episode; holds one page of each column in memory.
 pub(crate) struct EpisodeCursor {
     path: PathBuf,
     first_row: u64,
     rows: u64,
-    /// Rows that were read.
+    /// Number of rows read.
     read: u64,
     times: Option<Rows>,
     time_s: Vec<f64>,
-    /// Rows per second, where the time of a row is told by its number.
+    /// Frame rate, if the time of a row follows from its number \[Hz\].
     grid_hz: Option<f64>,
     columns: Vec<Rows>,
-    /// The present row of each column.
+    /// Current row of each column.
     values: Vec<Vec<f64>>,
     features: Vec<String>,
     quantities: [Quantity; 3],
@@ -97,7 +97,7 @@ impl EpisodeCursor {
         Ok(Some(time_ns))
     }
 
-    /// Puts a quantity of the present row into the joint state.
+    /// Copies a quantity of the current row into the joint state.
     fn take_quantity(&mut self, quantity: usize) -> Result<(), ArchiveError> {
         let store = match quantity {
             0 => &mut self.state.position,

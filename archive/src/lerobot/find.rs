@@ -1,4 +1,4 @@
-//! Which data set and which episode a path means.
+//! Resolution of a path to a data set and an episode.
 
 use std::path::{Path, PathBuf};
 
@@ -9,20 +9,20 @@ use crate::error::ArchiveError;
 use crate::lerobot_error::{LerobotError, LerobotProblem};
 use crate::parquet_file::ParquetFile;
 
-/// Where version 3 says in which file an episode lies.
+/// Folder of the tables that list the file of each episode in version 3.
 const EPISODES: &str = "meta/episodes";
-/// Columns of it.
+/// Columns of these tables.
 const CHUNK_INDEX: &str = "data/chunk_index";
 const FILE_INDEX: &str = "data/file_index";
-/// How an episode is named.
+/// Prefix of the name of an episode.
 const PREFIX: &str = "episode_";
-/// As many folders a file of rows lies below its data set at most.
+/// Maximum number of parent folders in which the data set of a file is searched.
 const MOST_FOLDERS: usize = 4;
-/// Most episodes that a data set is taken to have.
+/// Maximum number of episodes of a data set.
 /// Resolution: bounds memory; the largest have some hundred thousand.
 const MOST_EPISODES: u64 = 1 << 20;
 
-/// What a path means.
+/// Data set or episode at a path.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Place {
     /// All of the data set in this folder.
@@ -31,10 +31,10 @@ pub(crate) enum Place {
     Episode(PathBuf, u64),
 }
 
-/// What `path` means, if it is a data set or `DATASET/episode_000003`. A file is none of both.
+/// Resolves `path`, if it is a data set or `DATASET/episode_000003`. Returns `None` for a file.
 ///
 /// # Errors
-/// If a folder looks like a data set but does not say what is in it.
+/// If a folder looks like a data set but has no `meta/info.json`.
 pub(crate) fn locate(path: &Path) -> Result<Option<Place>, ArchiveError> {
     if path.is_dir() {
         if path.join(INFO).is_file() {
@@ -52,7 +52,7 @@ pub(crate) fn locate(path: &Path) -> Result<Option<Place>, ArchiveError> {
     Ok(found.map(|(root, number)| Place::Episode(root.to_owned(), number)))
 }
 
-/// The folder of a name without one is the present folder.
+/// Replaces an empty folder by the current folder.
 fn or_here(folder: &Path) -> &Path {
     if folder.as_os_str().is_empty() {
         return Path::new(".");
@@ -60,23 +60,23 @@ fn or_here(folder: &Path) -> &Path {
     folder
 }
 
-/// The number in `episode_000003`, with or without an ending.
+/// Returns the number in `episode_000003`, with or without an extension.
 fn number_of(path: &Path) -> Option<u64> {
     let digits = path.file_stem()?.to_str()?.strip_prefix(PREFIX)?;
     digits.parse().ok()
 }
 
-/// What the Parquet table at `path` means: the one episode in it.
+/// Resolves the Parquet table at `path` to the one episode in it.
 ///
 /// # Errors
-/// If it lies in no data set, or holds several episodes.
+/// If it belongs to no data set, or does not hold exactly one episode.
 pub(crate) fn of_table(path: &Path) -> Result<Place, ArchiveError> {
     let refuse = |problem| ArchiveError::from(LerobotError::new(path, problem));
     let absolute = std::path::absolute(path).map_err(ArchiveError::io(path))?;
     let mut folders = absolute.ancestors().skip(1).take(MOST_FOLDERS);
     let root = folders.find(|folder| folder.join(INFO).is_file());
     let root = root.ok_or_else(|| refuse(LerobotProblem::NoSet))?;
-    // As the user names it, where that can be.
+    // The path in the user's spelling, if that finds the data set.
     let depth = absolute.components().count() - root.components().count();
     let named = path.ancestors().nth(depth);
     let named = named.map(or_here).filter(|own| own.join(INFO).is_file());
@@ -100,10 +100,10 @@ pub(crate) fn of_table(path: &Path) -> Result<Place, ArchiveError> {
     }
 }
 
-/// The numbers of the episodes of the data set in the folder `root`.
+/// Returns the numbers of the episodes of the data set in the folder `root`.
 ///
 /// # Errors
-/// If there are none, or the data set does not tell them.
+/// If there are none, or the data set does not list them.
 pub(crate) fn episodes(root: &Path) -> Result<Vec<u64>, ArchiveError> {
     let info = Info::read(root)?;
     let numbers = numbers(root, &info)?;
@@ -114,10 +114,10 @@ pub(crate) fn episodes(root: &Path) -> Result<Vec<u64>, ArchiveError> {
 }
 
 impl Place {
-    /// The folder of the data set, and the one episode that is meant.
+    /// Returns the folder of the data set, and its episode.
     ///
     /// # Errors
-    /// If several are.
+    /// If the data set does not have exactly one episode.
     pub(crate) fn one(self) -> Result<(PathBuf, u64), ArchiveError> {
         match self {
             Self::Episode(root, number) => Ok((root, number)),
@@ -129,7 +129,7 @@ impl Place {
     }
 }
 
-/// How an episode is named.
+/// Returns the path that names an episode.
 pub(crate) fn name(root: &Path, number: u64) -> PathBuf {
     root.join(format!("{PREFIX}{number:06}"))
 }
@@ -156,10 +156,10 @@ fn numbers(root: &Path, info: &Info) -> Result<Vec<u64>, ArchiveError> {
     Ok(numbers)
 }
 
-/// The file in which the rows of an episode lie.
+/// Returns the file with the rows of an episode.
 ///
 /// # Errors
-/// If the data set has no such episode, or its file is not there.
+/// If the data set has no such episode, or its file is missing.
 pub(super) fn file_of(root: &Path, info: &Info, number: u64) -> Result<PathBuf, ArchiveError> {
     let wrong = |problem| ArchiveError::from(LerobotError::new(root, problem));
     let below = if info.has_file_by_episode() {
@@ -196,7 +196,7 @@ pub(super) fn file_of(root: &Path, info: &Info, number: u64) -> Result<PathBuf, 
     Ok(path)
 }
 
-/// Calls `take` with the number, the chunk and the file of each episode of version 3, until it answers `false`.
+/// Calls `take` with the number, the chunk and the file of each episode of version 3, until it returns `false`.
 fn each_episode(
     root: &Path,
     mut take: impl FnMut(u64, u64, u64) -> bool,
@@ -233,7 +233,7 @@ fn each_episode(
     Ok(())
 }
 
-/// `chunk-*/file-*.parquet` in a folder, in their order.
+/// Returns the files `chunk-*/file-*.parquet` in a folder, sorted by path.
 fn tables(folder: &Path) -> Vec<PathBuf> {
     let entries = |folder: &Path| {
         let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
@@ -246,7 +246,7 @@ fn tables(folder: &Path) -> Vec<PathBuf> {
     tables
 }
 
-/// The files on which the episode depends: its rows, and what says what they are.
+/// Returns the files on which the episode depends: its rows and their descriptions.
 ///
 /// # Errors
 /// As when it is opened.

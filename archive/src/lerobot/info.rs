@@ -1,4 +1,4 @@
-//! `meta/info.json`: what a row of the data set is, and where the rows lie.
+//! `meta/info.json`: the features of a row of the data set, and the files with the rows.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -11,15 +11,15 @@ use serde_json::Value;
 use crate::error::ArchiveError;
 use crate::lerobot_error::{LerobotError, LerobotProblem};
 
-/// Where it lies in the data set.
+/// Path in the data set.
 pub(super) const INFO: &str = "meta/info.json";
 /// Longest file that is read \[bytes\].
 /// Resolution: bounds memory; a set with a hundred cameras has 100 kB.
 const MAX_BYTES: u64 = 8 << 20;
-/// Episodes to a chunk where it is not said, as in LeRobot.
+/// Default number of episodes per chunk, as in LeRobot.
 const CHUNK: u64 = 1000;
 
-/// What is read of it.
+/// The keys of `meta/info.json` that are read.
 #[derive(Debug, Deserialize)]
 pub(super) struct Info {
     #[serde(default)]
@@ -49,13 +49,13 @@ pub(super) struct Feature {
 }
 
 impl Feature {
-    /// Whether it holds numbers, one or a list.
+    /// Returns whether it is a number or a list of numbers.
     pub(super) fn is_numeric(&self) -> bool {
         let number = self.dtype.starts_with("float") || self.dtype.starts_with("int");
         number && self.width().is_some()
     }
 
-    /// How many numbers it holds.
+    /// Returns the number of its elements.
     pub(super) fn width(&self) -> Option<usize> {
         match self.shape.as_array()?.as_slice() {
             [width] => usize::try_from(width.as_u64()?).ok(),
@@ -63,7 +63,7 @@ impl Feature {
         }
     }
 
-    /// The name of each, if they have names: a list, a list in a list, or a list under a key such as `motors`.
+    /// Returns the names of its elements, if given: a list, a list in a list, or a list under a key such as `motors`.
     pub(super) fn names(&self) -> Option<Vec<&str>> {
         let mut lists: Vec<&Value> = vec![&self.names];
         if let Some(object) = self.names.as_object() {
@@ -83,7 +83,7 @@ impl Feature {
 }
 
 impl Info {
-    /// Reads that of the data set in the folder `root`.
+    /// Reads the file of the data set in the folder `root`.
     pub(super) fn read(root: &Path) -> Result<Self, ArchiveError> {
         let path = root.join(INFO);
         let broken = |reason: String| {
@@ -111,13 +111,13 @@ impl Info {
         Ok(info)
     }
 
-    /// Whether each episode has a file of its own, whose name tells it: version 2.
+    /// Returns whether each episode has its own file, named by the number of the episode: version 2.
     pub(super) fn has_file_by_episode(&self) -> bool {
         let template = self.data_path.as_deref();
         template.is_some_and(|template| template.contains("{episode_index"))
     }
 
-    /// The file of the episode `number`, below the data set: version 2.
+    /// Returns the file of the episode `number`, relative to the data set: version 2.
     pub(super) fn file_of_episode(&self, number: u64) -> Option<PathBuf> {
         let chunk = number / self.chunks_size.filter(|size| *size > 0).unwrap_or(CHUNK);
         self.fill(&[
@@ -128,13 +128,13 @@ impl Info {
         ])
     }
 
-    /// The file `file` of the chunk `chunk`, below the data set: version 3.
+    /// Returns the file `file` of the chunk `chunk`, relative to the data set: version 3.
     pub(super) fn file_of_chunk(&self, chunk: u64, file: u64) -> Option<PathBuf> {
         self.fill(&[("chunk_index", chunk), ("file_index", file)])
     }
 
-    /// The path of the template, such as `data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet`; `None` if it
-    /// asks for something else, or leads out of the data set.
+    /// Fills the path template, such as `data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet`. Returns `None`
+    /// if it has another placeholder, or leads out of the data set.
     fn fill(&self, numbers: &[(&str, u64)]) -> Option<PathBuf> {
         let mut rest = self.data_path.as_deref()?;
         let mut filled = String::new();
@@ -163,7 +163,7 @@ impl Info {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+    #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
     use super::*;
 

@@ -1,4 +1,4 @@
-//! Which element of which feature is what.
+//! Assignment of the elements of features to joints and quantities.
 
 use std::path::Path;
 
@@ -11,16 +11,16 @@ use crate::lerobot_error::{LerobotError, LerobotProblem};
 /// An element of a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Element {
-    /// Place in [`Layout::features`].
+    /// Index into [`Layout::features`].
     pub(super) feature: usize,
-    /// Place in the feature.
+    /// Index in the feature.
     pub(super) at: usize,
 }
 
-/// A quantity by joint; `None` where a joint has none. Empty if no joint has one.
+/// The element of a quantity for each joint; `None` for a joint without the quantity. Empty if no joint has it.
 pub(super) type Quantity = Vec<Option<Element>>;
 
-/// What the rows of a data set hold of joints.
+/// Joint data in the rows of a data set.
 #[derive(Debug, Default)]
 pub(super) struct Layout {
     /// The robot's joints.
@@ -30,13 +30,13 @@ pub(super) struct Layout {
     pub(super) position: Quantity,
     pub(super) velocity: Quantity,
     pub(super) effort: Quantity,
-    /// What positions and velocities are multiplied with.
+    /// Factor applied to positions and velocities: degrees to radians, or 1.
     pub(super) scale: f64,
-    /// All features that hold numbers, for errors.
+    /// All numeric features, for error messages.
     pub(super) known: Vec<String>,
 }
 
-/// An element with the joint that its name tells.
+/// An element, with the joint and the quantity in its name.
 struct Named {
     joint: String,
     kind: Option<Kind>,
@@ -44,7 +44,7 @@ struct Named {
 }
 
 impl Layout {
-    /// Of the data set in the folder `root`.
+    /// Determines the layout of the data set in the folder `root`.
     pub(super) fn of(
         root: &Path,
         info: &Info,
@@ -86,7 +86,7 @@ impl Layout {
     }
 }
 
-/// A key of the file of columns, and why it does not fit.
+/// A key of the columns file, and the reason why it does not fit.
 type Unfit = (&'static str, String);
 
 struct Builder<'a> {
@@ -101,7 +101,7 @@ impl Builder<'_> {
             let of_kind = state.iter().filter(move |named| named.kind == Some(kind));
             of_kind.map(|named| (named.joint.as_str(), named.element))
         };
-        // In a feature of positions, what has no ending is one.
+        // In a state feature, an element without a suffix is a position.
         let is_position = |named: &&Named| matches!(named.kind, None | Some(Kind::Position));
         let positions = state.iter().filter(is_position);
         let mut positions: Vec<(String, Element)> = positions
@@ -120,7 +120,7 @@ impl Builder<'_> {
             if all.iter().any(Option::is_some) {
                 all
             } else if found.len() == joints.len() {
-                // Names that say nothing, such as `effort_0`, keep the order.
+                // Names without a known joint, such as `effort_0`, are assigned in order.
                 found.iter().map(|(_, element)| Some(*element)).collect()
             } else {
                 Vec::new()
@@ -170,7 +170,7 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// The elements of the first of these features that is there.
+    /// Returns the elements of the first of these features that exists.
     fn first_of(&mut self, features: &[&str]) -> Vec<Named> {
         let is_there = |name: &&&str| {
             self.info
@@ -184,7 +184,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The elements of a feature. Without names they are `joint_0`, `joint_1` and so on.
+    /// Returns the elements of a feature. Elements without names are called `joint_0`, `joint_1` and so on.
     fn elements(&mut self, feature: &str) -> Vec<Named> {
         let Some(about) = self.info.features.get(feature) else {
             return Vec::new();
@@ -205,7 +205,7 @@ impl Builder<'_> {
             .collect()
     }
 
-    /// The place of a feature among those that are read.
+    /// Returns the index of a feature among those that are read, and adds it if necessary.
     fn place(&mut self, feature: &str) -> usize {
         let features = &mut self.layout.features;
         let found = features.iter().position(|own| own == feature);
@@ -215,7 +215,7 @@ impl Builder<'_> {
         })
     }
 
-    /// The elements that the file of columns names: `FEATURE` for all of a feature, `FEATURE.NAME` for one.
+    /// Returns the elements that the columns file names: `FEATURE` for all of a feature, `FEATURE.NAME` for one.
     fn named(
         &mut self,
         what: &'static str,

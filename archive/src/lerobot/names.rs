@@ -1,6 +1,6 @@
-//! What the names of features and of their elements tell.
+//! Meaning of the names of features and of their elements.
 
-/// Features that hold positions, and perhaps velocities and efforts beside them; the first one that is there counts.
+/// Features that hold positions, and possibly velocities and efforts; the first that exists is used.
 pub(super) const STATE: [&str; 4] = [
     "observation.state",
     "observation.qpos",
@@ -22,17 +22,17 @@ pub(super) const EFFORT: [&str; 4] = [
     "observation.joint_efforts",
 ];
 
-/// What an element is.
+/// Quantity of an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Position,
     Velocity,
     Effort,
-    /// What a controller takes for the effort of the surroundings: the expected effort is subtracted already.
+    /// External effort estimated by a controller, with the expected effort already subtracted.
     External,
 }
 
-/// How names end, behind a point or an underscore. Longer ones come before those that they end in.
+/// Suffixes of names, after a dot, an underscore or a slash. A longer suffix precedes the ones that it ends in.
 const ENDINGS: [(&str, Kind); 13] = [
     ("ext_eff", Kind::External),
     ("external_effort", Kind::External),
@@ -49,7 +49,7 @@ const ENDINGS: [(&str, Kind); 13] = [
     ("tor", Kind::Effort),
 ];
 
-/// The joint of an element, and what it is of it if the name tells: `joint_1.torque` in OpenArm's sets.
+/// Splits the name of an element into its joint and its quantity, if any: `joint_1.torque` in OpenArm's sets.
 pub(super) fn split(name: &str) -> (&str, Option<Kind>) {
     for (ending, kind) in ENDINGS {
         let joint = name

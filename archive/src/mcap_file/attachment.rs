@@ -13,8 +13,8 @@ const MAX_HEADER_BYTES: u64 = 64 << 10;
 /// Physical: the MCAP format: a CRC-32.
 const CRC_BYTES: u64 = 4;
 
-/// The header at the front of an attachment record's body of `len` bytes, where its data begin and
-/// how long they are; `None` if it makes no sense.
+/// Parses the header at the front of an attachment record's body of `len` bytes. Returns it with the offset and the
+/// length of the data; `None` if it is malformed.
 pub(crate) fn attachment_header(
     from: &mut impl Read,
     len: u64,

@@ -1,4 +1,4 @@
-//! A chunk: its header, its content unpacked, and the records in that.
+//! A chunk: its header, its decompressed content, and the records in it.
 
 use std::io::Read;
 
@@ -8,7 +8,7 @@ use super::{MESSAGE_HEADER_BYTES, RECORD_PREFIX_BYTES};
 use crate::chunks::MAX_LOADED_BYTES;
 use crate::fields::Fields;
 
-/// What a chunk says of itself.
+/// Header of a chunk.
 pub(super) struct ChunkHeader<'a> {
     pub(super) start_ns: u64,
     pub(super) end_ns: u64,
@@ -19,8 +19,8 @@ pub(super) struct ChunkHeader<'a> {
 }
 
 impl<'a> ChunkHeader<'a> {
-    /// The header at the front of a chunk record's body, and the packed records behind it. The body
-    /// may be cut short.
+    /// Parses the header at the front of a chunk record's body. Returns it with the compressed records behind it. The
+    /// body may be truncated.
     pub(super) fn parse(body: &'a [u8]) -> Option<(Self, &'a [u8])> {
         let mut fields = Fields(body);
         let header = Self {
@@ -35,7 +35,7 @@ impl<'a> ChunkHeader<'a> {
     }
 }
 
-/// Unpacks chunks; keeps what the decompressor needs from one to the next.
+/// Decompressor of chunks, with state that is reused from one chunk to the next.
 pub(super) struct Unpacker {
     zstd: zstd::bulk::Decompressor<'static>,
 }
@@ -47,10 +47,10 @@ impl Unpacker {
         })
     }
 
-    /// The records of the chunk whose record body is `body`, checked by length and CRC.
+    /// Decompresses the records of the chunk whose record body is `body`, and checks their length and CRC.
     ///
     /// # Errors
-    /// Why they cannot be trusted, in words; `records` is then void.
+    /// The reason why they cannot be used; the content of `records` is then undefined.
     pub(super) fn unpack(&mut self, body: &[u8], records: &mut Vec<u8>) -> Result<(), String> {
         records.clear();
         let (header, packed) = ChunkHeader::parse(body).ok_or("its header is broken")?;
@@ -107,15 +107,15 @@ impl Unpacker {
         Ok(())
     }
 
-    /// What can be had of a chunk that is torn off within `body`: unchecked, as the checksum is over
-    /// the whole.
+    /// Decompresses the readable part of a chunk that is truncated within `body`. It is not checked, because the
+    /// checksum covers the whole chunk.
     pub(super) fn unpack_torn(body: &[u8], records: &mut Vec<u8>) {
         records.clear();
         let Some((header, packed)) = ChunkHeader::parse(body) else {
             return;
         };
         let limit = MAX_LOADED_BYTES as u64;
-        // Both decoders give all they have before they say that the rest is missing.
+        // Both decoders write all available data before they report the truncation.
         let _missing_rest = match header.compression {
             "" => packed.take(limit).read_to_end(records),
             "zstd" => zstd::stream::read::Decoder::with_buffer(packed)
@@ -127,15 +127,15 @@ impl Unpacker {
     }
 }
 
-/// A record among unpacked ones.
+/// A record in a decompressed chunk.
 pub(super) struct Inner<'a> {
     pub(super) opcode: u8,
-    /// Where its body begins.
+    /// Offset of its body in the decompressed chunk.
     pub(super) at: usize,
     pub(super) body: &'a [u8],
 }
 
-/// The records in `records`; the last item is an `Err` with its place if one is cut short.
+/// Iterates over the records in `records`. The last item is an `Err` with the offset of a truncated record, if any.
 pub(super) fn inner_records(records: &[u8]) -> impl Iterator<Item = Result<Inner<'_>, usize>> {
     let mut at = 0;
     std::iter::from_fn(move || {
@@ -161,7 +161,7 @@ pub(super) fn inner_records(records: &[u8]) -> impl Iterator<Item = Result<Inner
     })
 }
 
-/// What stands before a message's body.
+/// Header of a message record.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MessageHeader {
     pub(super) channel: u16,
@@ -171,8 +171,7 @@ pub(super) struct MessageHeader {
 }
 
 impl MessageHeader {
-    /// The header at the front of a message record's body; the message follows after
-    /// [`MESSAGE_HEADER_BYTES`].
+    /// Parses the header at the front of a message record's body; the message follows after [`MESSAGE_HEADER_BYTES`].
     pub(super) fn parse(body: &[u8]) -> Option<Self> {
         let mut fields = Fields(body.get(..MESSAGE_HEADER_BYTES)?);
         Some(Self {
@@ -185,7 +184,7 @@ impl MessageHeader {
 }
 
 impl Inner<'_> {
-    /// The header, if this is a message.
+    /// Returns the message header, if this is a message.
     pub(super) fn message(&self) -> Option<MessageHeader> {
         (self.opcode == op::MESSAGE)
             .then(|| MessageHeader::parse(self.body))

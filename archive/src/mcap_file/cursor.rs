@@ -1,4 +1,4 @@
-//! The messages of an MCAP file one after the other.
+//! Sequential access to the messages of an MCAP file.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -16,17 +16,17 @@ use crate::error::ArchiveError;
 
 pub(crate) type McapCursor = ChunkCursor<McapChunks>;
 
-/// The extents of a file as they are loaded.
+/// Loader of the extents of a file.
 pub(crate) struct McapChunks {
     layout: Arc<Layout>,
     file: File,
-    /// What the owner calls each channel; `None` if it is not wanted.
+    /// The caller's topic number of each channel; `None` if it is not selected.
     topic_by_channel: Vec<Option<usize>>,
     unpacker: Unpacker,
     packed: Vec<u8>,
 }
 
-/// Over the channels to which `topic` gives a number.
+/// Creates a cursor over the channels for which `topic` returns a number.
 pub(crate) fn mcap_cursor(
     layout: Arc<Layout>,
     order: Order,
@@ -47,7 +47,7 @@ pub(crate) fn mcap_cursor(
         .collect();
     let wanted = |extent: &Extent| {
         let wanted = |&id: &u16| {
-            // A channel that nobody declared is damage to be told.
+            // An undeclared channel is damage, which loading the extent reports.
             topic_by_channel
                 .get(id as usize)
                 .is_none_or(Option::is_some)
@@ -100,7 +100,7 @@ impl Chunks for McapChunks {
 }
 
 impl McapChunks {
-    /// The records of `extent`, or in words why they cannot be had.
+    /// Reads the records of `extent`. The inner error is the reason why they cannot be read.
     fn read(
         &mut self,
         extent: &Extent,
@@ -145,7 +145,7 @@ impl McapChunks {
         Ok(self.unpacker.unpack(body, records))
     }
 
-    /// Lists the wanted messages of an extent, and tells a flaw among them.
+    /// Lists the selected messages of an extent. Returns a description of the last malformed record, if any.
     fn list(&mut self, extent: &Extent, loaded: &mut Loaded) -> Option<String> {
         let mut flaw = None;
         for record in inner_records(&loaded.records) {

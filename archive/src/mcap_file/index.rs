@@ -1,4 +1,4 @@
-//! The layout of a file from the index at its end, with a look at what lies between the chunks.
+//! The layout of a file from the index at its end and the records between its chunks.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -22,15 +22,15 @@ const FILE_END_BYTES: u64 = RECORD_PREFIX_BYTES + FOOTER_BODY_BYTES + mcap::MAGI
 pub(crate) const CRC_FROM_END_BYTES: u64 = 4 + mcap::MAGIC.len() as u64;
 
 pub(super) enum Outcome {
-    /// All that the layout should say, it says.
+    /// The layout is complete.
     Complete,
-    /// The file has no index, or one that leaves things out.
+    /// The file has no index, or an incomplete one.
     Absent,
-    /// The index is broken.
+    /// The index is damaged.
     Unsound { at: u64, reason: String },
 }
 
-/// Fills `layout` from the index of `file`. Unless that is complete, `layout` is void.
+/// Fills `layout` from the index of `file`. Unless the outcome is complete, the content of `layout` is undefined.
 pub(super) fn read(file: &File, layout: &mut Layout) -> io::Result<Outcome> {
     let Some(footer) = read_footer(file, layout.file_bytes)? else {
         return Ok(Outcome::Unsound {
@@ -72,7 +72,7 @@ pub(super) fn read(file: &File, layout: &mut Layout) -> io::Result<Outcome> {
     }
 }
 
-/// The footer, if the file ends in one.
+/// Reads the footer, if the file ends in one.
 pub(crate) fn read_footer(mut file: &File, file_bytes: u64) -> io::Result<Option<Footer>> {
     if file_bytes < FILE_END_BYTES + mcap::MAGIC.len() as u64 {
         return Ok(None);
@@ -102,7 +102,7 @@ fn check_crc(file: &File, footer: &Footer, file_bytes: u64) -> io::Result<Option
     Ok((crc != saved).then(|| format!("its CRC is {crc:08x}, the footer says {saved:08x}")))
 }
 
-/// The CRC of the summary: from its beginning to just before the CRC itself in the footer.
+/// Computes the CRC of the summary: from its beginning to just before the CRC itself in the footer.
 pub(crate) fn summary_crc(mut file: &File, summary_start: u64, file_bytes: u64) -> io::Result<u32> {
     file.seek(SeekFrom::Start(summary_start))?;
     let mut left = file.take((file_bytes - CRC_FROM_END_BYTES).saturating_sub(summary_start));
@@ -117,7 +117,7 @@ pub(crate) fn summary_crc(mut file: &File, summary_start: u64, file_bytes: u64) 
     }
 }
 
-/// A place in the file and what is wrong there.
+/// File offset and description of a flaw.
 type Flaw = (u64, String);
 
 #[derive(Default)]
@@ -163,7 +163,7 @@ impl Summary {
     }
 }
 
-/// Checks that chunks and what lies between them make up the whole data section, and notes both.
+/// Checks that the chunks and the records between them make up the whole data section, and records both.
 fn place(
     file: &File,
     layout: &mut Layout,
@@ -201,7 +201,7 @@ fn place(
     between(file, layout, at, data_end)
 }
 
-/// Records between chunks: the header, metadata, attachments, and messages without a chunk.
+/// Reads the records between chunks: the header, metadata, attachments, and messages outside chunks.
 fn between(file: &File, layout: &mut Layout, from: u64, end: u64) -> io::Result<Result<(), Flaw>> {
     if from == end {
         return Ok(Ok(()));

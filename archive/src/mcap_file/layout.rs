@@ -1,4 +1,4 @@
-//! What an MCAP file holds, and where.
+//! Contents of an MCAP file, with their positions.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,20 +10,20 @@ use crate::damage::{Damage, DamageKind};
 use crate::fields::Fields;
 use crate::topic::{Topic, Topics};
 
-/// Most damages of a file that are told.
+/// Maximum number of damages reported for a file.
 /// Resolution: bounds memory.
 const MAX_DAMAGES: usize = 1000;
-/// Most channels of a file.
+/// Maximum number of channels of a file.
 /// Resolution: bounds time; a robot has some hundreds.
 const MAX_CHANNELS: usize = 4096;
-/// Longest schemas, channels and metadata of a file together \[bytes\].
+/// Maximum total size of the schemas, channels and metadata of a file \[bytes\].
 /// Resolution: bounds memory.
 const MAX_KEPT_BYTES: u64 = 256 << 20;
 
-/// Where messages lie.
+/// A contiguous range of a file that contains messages.
 #[derive(Debug, Clone)]
 pub(super) struct Extent {
-    /// Place of the first record's opcode.
+    /// File offset of the first record's opcode.
     pub(super) at: u64,
     /// Length of all records with their prefixes.
     pub(super) len: u64,
@@ -39,13 +39,13 @@ pub(super) struct Extent {
 pub(super) enum ExtentKind {
     /// One chunk record.
     Chunk,
-    /// The last chunk, torn off within.
+    /// The last chunk, truncated.
     TornChunk,
-    /// Records that lie in the file without a chunk around them.
+    /// Records outside chunks.
     Plain,
 }
 
-/// How the messages of a channel are to be read.
+/// Schema of the messages of a channel.
 #[derive(Debug, Clone)]
 pub(crate) struct Schema {
     pub(crate) name: String,
@@ -53,7 +53,7 @@ pub(crate) struct Schema {
     pub(crate) data: Vec<u8>,
 }
 
-/// What an MCAP file holds, and where.
+/// Contents of an MCAP file, with their positions.
 #[derive(Debug)]
 pub(crate) struct Layout {
     pub(crate) path: PathBuf,
@@ -69,16 +69,16 @@ pub(crate) struct Layout {
     /// Least and greatest log time.
     pub(crate) log_times: Option<(u64, u64)>,
     pub(crate) metadata: Vec<Metadata>,
-    /// Place and length of each attachment's record body.
+    /// Offset and length of each attachment's record body.
     pub(crate) attachments: Vec<(u64, u64)>,
     pub(crate) damage: Vec<Damage>,
     pub(super) extents: Vec<Extent>,
-    /// Length of the records that were taken in \[bytes\].
+    /// Total length of the records kept \[bytes\].
     kept_bytes: u64,
 }
 
 impl Layout {
-    /// Chunks, and runs of messages without one.
+    /// Returns the number of chunks and of runs of messages outside chunks.
     pub(crate) fn chunks(&self) -> u64 {
         self.extents.len() as u64
     }
@@ -102,7 +102,7 @@ impl Layout {
         }
     }
 
-    /// The topics, and which channel belongs to which.
+    /// Returns the topics with their channels.
     pub(crate) fn topics(&self) -> Topics {
         let mut topics = Topics::default();
         for (&id, channel) in &self.channels {
@@ -121,7 +121,7 @@ impl Layout {
         topics
     }
 
-    /// Notes a damage; of very many the first.
+    /// Records a damage, unless [`MAX_DAMAGES`] are recorded.
     pub(super) fn damage(&mut self, at: u64, kind: DamageKind) {
         if self.damage.len() >= MAX_DAMAGES {
             return;
@@ -149,10 +149,10 @@ impl Layout {
         });
     }
 
-    /// Takes in a schema, channel, metadata or header record; others are passed over.
+    /// Stores a schema, channel, metadata or header record, and ignores others.
     ///
     /// # Errors
-    /// Why the record makes no sense, in words.
+    /// The reason why the record is invalid.
     pub(super) fn take_in(&mut self, opcode: u8, body: &[u8]) -> Result<(), String> {
         if !matches!(opcode, op::HEADER | op::SCHEMA | op::CHANNEL | op::METADATA) {
             return Ok(());
@@ -191,12 +191,12 @@ impl Layout {
     }
 }
 
-/// Parses a record whose lengths fit into it.
+/// Parses a record, after checking that its texts end within it.
 ///
 /// # Errors
-/// Why it makes no sense, in words.
+/// The reason why the record is invalid.
 pub(super) fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, String> {
-    // The mcap crate makes room for a text of any length before it looks whether there is one.
+    // The mcap crate allocates the declared length of a text before it checks that the record contains it.
     if !lengths_fit(opcode, body) {
         return Err("a text that reaches beyond its record".to_owned());
     }

@@ -28,7 +28,7 @@ impl Layout {
             }
         }
         scan::read(&file, &mut layout).map_err(ArchiveError::io(path))?;
-        // Of a file that is torn within its data, that it has no index goes without saying.
+        // A file that is torn within its data cannot have an index, so that is not reported.
         let torn = |damage: &Damage| damage.kind == DamageKind::TornTail;
         if layout.damage.iter().any(torn) {
             layout

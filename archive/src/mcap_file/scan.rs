@@ -1,5 +1,4 @@
-//! The layout of a file without a sound index: a walk through all of it, chunks unpacked and
-//! checked.
+//! The layout of a file without a sound index, from reading all of it and checking the decompressed chunks.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -14,11 +13,11 @@ use super::{MAX_RECORD_BYTES, MESSAGE_HEADER_BYTES, RECORD_PREFIX_BYTES};
 use crate::chunks::{MAX_LOADED_BYTES, too_long};
 use crate::damage::DamageKind;
 
-/// Messages without a chunk are read in runs of about this length \[bytes\].
+/// Approximate length of a run of messages outside chunks that is read at once \[bytes\].
 /// Resolution: memory against the number of reads.
 const PLAIN_RUN_BYTES: u64 = 1 << 20;
 
-/// Fills `layout` from all of `file`, up to where it is torn or makes no sense.
+/// Fills `layout` by reading `file` up to the end of its data, a truncation or a malformed record.
 pub(super) fn read(file: &File, layout: &mut Layout) -> io::Result<()> {
     let start = mcap::MAGIC.len() as u64;
     let mut walk = Walk::new(file.try_clone()?, start, layout.file_bytes)?;
@@ -46,7 +45,7 @@ struct Scan<'a> {
 }
 
 impl Scan<'_> {
-    /// Where and why it could not go on, if not at the end of the data.
+    /// Reads all records. Returns the position and kind of the damage that stopped it, if any.
     fn run(&mut self, walk: &mut Walk) -> io::Result<Option<(u64, DamageKind)>> {
         let mut first = true;
         loop {
@@ -125,7 +124,7 @@ impl Scan<'_> {
         Ok(())
     }
 
-    /// Takes in what lies in the unpacked chunk.
+    /// Records the messages and declarations in the decompressed chunk.
     fn note_chunk(&mut self, at: u64, body_len: u64, kind: ExtentKind) {
         let mut times: Option<(u64, u64)> = None;
         let mut channels = BTreeSet::new();
@@ -159,7 +158,7 @@ impl Scan<'_> {
     }
 }
 
-/// Messages that follow one another in the file without a chunk around them.
+/// A run of consecutive messages outside chunks.
 #[derive(Default)]
 pub(super) struct PlainRun {
     extent: Option<Extent>,
@@ -191,9 +190,9 @@ impl PlainRun {
     }
 }
 
-/// Takes in a record that is no chunk; gives its header if it is a message.
+/// Records a message, attachment or declaration outside chunks. Returns its header if it is a message.
 ///
-/// The inner error says, in words, why the record makes no sense.
+/// The inner error is the reason why the record is invalid.
 pub(super) fn note_plain(
     walk: &mut Walk,
     record: Record,

@@ -1,27 +1,27 @@
-//! From record to record through a part of a file, reading only what is asked for.
+//! Iteration over the records in a part of a file; reads only the requested bodies.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 use super::RECORD_PREFIX_BYTES;
 
-/// Where a record lies.
+/// Position of a record in the file.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Record {
     pub(super) opcode: u8,
-    /// Its opcode's place in the file.
+    /// File offset of its opcode.
     pub(super) at: u64,
     /// Length of its body.
     pub(super) len: u64,
 }
 
-/// What comes next.
+/// Result of a step to the next record.
 pub(super) enum Step {
     /// A whole record.
     Record(Record),
-    /// A record that says it is longer than what is left.
+    /// A record whose declared length exceeds the rest of the part.
     Torn(Record),
-    /// Fewer bytes than a record begins with, at this place.
+    /// Fewer bytes than the prefix of a record, at this offset.
     TornPrefix(u64),
     /// The end of the part.
     End,
@@ -29,15 +29,15 @@ pub(super) enum Step {
 
 pub(super) struct Walk {
     reader: BufReader<File>,
-    /// Where the reader stands.
+    /// File offset of the reader.
     position: u64,
-    /// Where the next record begins.
+    /// File offset of the next record.
     next: u64,
     end: u64,
 }
 
 impl Walk {
-    /// Over bytes `from..end` of `file`; `from` must be where a record begins.
+    /// Creates a walk over the bytes `from..end` of `file`; a record must begin at `from`.
     pub(super) fn new(file: File, from: u64, end: u64) -> io::Result<Self> {
         let mut reader = BufReader::with_capacity(64 << 10, file);
         reader.seek(SeekFrom::Start(from))?;
@@ -49,7 +49,7 @@ impl Walk {
         })
     }
 
-    /// The next record; what was not read of the one before is skipped.
+    /// Advances to the next record, and skips the unread rest of the preceding one.
     pub(super) fn step(&mut self) -> io::Result<Step> {
         self.jump(self.next)?;
         let at = self.next;
@@ -76,7 +76,7 @@ impl Walk {
         Ok(Step::Record(record))
     }
 
-    /// The next `len` bytes of the body of the record that [`Walk::step`] gave.
+    /// Reads the next `len` bytes of the body of the record that [`Walk::step`] returned.
     pub(super) fn read(&mut self, len: usize, into: &mut Vec<u8>) -> io::Result<()> {
         into.clear();
         let read = (&mut self.reader).take(len as u64).read_to_end(into)?;
@@ -87,7 +87,7 @@ impl Walk {
         Ok(())
     }
 
-    /// What is left from here to the end of the part.
+    /// Reads the bytes from the current offset to the end of the part.
     pub(super) fn read_rest(&mut self, into: &mut Vec<u8>) -> io::Result<()> {
         let left = self.end.saturating_sub(self.position) as usize;
         self.read(left, into)

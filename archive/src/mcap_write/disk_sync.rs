@@ -1,4 +1,4 @@
-//! Brings what was written to the disk, on a thread of its own: a slow disk makes nobody wait.
+//! Syncs written data to the disk on a separate thread, so that a slow disk does not block the writer.
 
 use std::fs::File;
 use std::io;
@@ -6,8 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Syncs a file when asked to, but not more often than it was told at the start. One request waits at
-/// most: what is written while a sync runs goes with the next.
+/// Thread that syncs a file on request, at most once per interval. Requests during a sync are merged into one.
 pub(super) struct DiskSync {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
@@ -23,7 +22,7 @@ struct Shared {
 struct State {
     wanted: bool,
     closed: bool,
-    /// Of the first sync that failed, until it is told.
+    /// Error of the first failed sync, until it is reported.
     error: Option<io::Error>,
     slowest: Duration,
 }
@@ -41,10 +40,10 @@ impl DiskSync {
         })
     }
 
-    /// Asks for a sync of all that the operating system has been given by now.
+    /// Requests a sync of all data handed to the operating system so far.
     ///
     /// # Errors
-    /// What the disk said of an earlier one, once.
+    /// The error of an earlier sync, reported once.
     pub(super) fn ask(&self) -> io::Result<()> {
         let mut state = self.shared.lock();
         state.wanted = true;
@@ -52,7 +51,7 @@ impl DiskSync {
         state.error.take().map_or(Ok(()), Err)
     }
 
-    /// The longest that a sync has taken.
+    /// Returns the longest duration of a sync.
     pub(super) fn slowest(&self) -> Duration {
         self.shared.lock().slowest
     }

@@ -1,47 +1,47 @@
-//! Why a recording cannot be written.
+//! Errors of writing a recording.
 
 use std::path::{Path, PathBuf};
 
 use crate::ros;
 
-/// Why a recording cannot be written.
+/// An error of writing a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// The operating system refuses.
+    /// An I/O error.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What it says.
+        /// The operating system's error.
         source: std::io::Error,
     },
-    /// The file cannot be written on.
+    /// An error of the MCAP writer.
     #[error("{}: {source}", path.display())]
     Mcap {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The MCAP error.
         source: Box<mcap::McapError>,
     },
-    /// A message cannot be encoded.
+    /// A message that cannot be encoded.
     #[error("{}: topic {topic:?}: {source}", path.display())]
     Encode {
         /// The file.
         path: PathBuf,
         /// The topic.
         topic: String,
-        /// What is wrong with the message.
+        /// The encoding error.
         source: ros::EncodeError,
     },
-    /// The bag's metadata cannot be written as YAML.
+    /// Bag metadata that cannot be written as YAML.
     #[error("{}: {source}", path.display())]
     Metadata {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The serialization error.
         source: Box<serde_saphyr::SerializeError>,
     },
-    /// MCAP knows no time before the epoch.
+    /// A time before the epoch, which MCAP cannot represent.
     #[error("{}: topic {topic:?}: a message at {ns} ns, before the epoch", path.display())]
     BeforeEpoch {
         /// The file.

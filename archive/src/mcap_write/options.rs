@@ -1,9 +1,9 @@
-//! How the files are written.
+//! Options for writing MCAP files.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How chunks are packed.
+/// Compression of the chunks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Compression {
@@ -12,11 +12,11 @@ pub enum Compression {
     Zstd,
     /// LZ4: faster, larger.
     Lz4,
-    /// Not at all.
+    /// No compression.
     None,
 }
 
-/// Options that every file of ours shares.
+/// Options of every MCAP file that tauscope writes.
 pub(crate) fn options(compression: Compression) -> mcap::WriteOptions {
     mcap::WriteOptions::new()
         .compression(match compression {
@@ -24,10 +24,10 @@ pub(crate) fn options(compression: Compression) -> mcap::WriteOptions {
             Compression::Lz4 => Some(mcap::Compression::Lz4),
             Compression::None => None,
         })
-        // One thread: else the bytes depend on the number of cores.
+        // One thread; otherwise the bytes depend on the number of cores.
         .compression_threads(0)
         // Chunks are closed by time and size here.
         .chunk_size(None)
-        // A chunk comes into the file whole: a torn one is never patched.
+        // A chunk is written to the file at once, so that an incomplete one is never patched.
         .disable_seeking(true)
 }

@@ -1,5 +1,5 @@
-//! What rosbag2 wants to find: its quality-of-service profiles and the metadata of a bag as YAML
-//! (version 9), in an MCAP file and beside it.
+//! Data that rosbag2 expects in an MCAP file and next to it: quality-of-service profiles and the metadata of a bag as
+//! YAML (version 9).
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ pub(crate) struct BagTopic {
 pub(crate) struct BagFile {
     name: String,
     log_times_ns: Option<(i64, i64)>,
-    /// Messages in it; those of all topics where it is the only one.
+    /// Number of messages; `None` for the only file of a bag, which has those of all topics.
     messages: Option<u64>,
 }
 

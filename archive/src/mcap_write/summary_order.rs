@@ -1,8 +1,8 @@
-//! Puts the summary of a finished MCAP file in order.
+//! Sorts the summary of a finished MCAP file.
 //!
-//! The mcap crate writes the schemas and channels of the summary in the order of a hash map, another
-//! one each time. Nothing else in the file depends on it, so the two groups are sorted by number
-//! where they lie, and the summary's CRC is made anew.
+//! The mcap crate writes the schemas and channels of the summary in the order of a hash map, which differs each time.
+//! Nothing else in the file depends on it, so the two groups are sorted by number in place, and the CRC of the
+//! summary is recomputed.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};

@@ -1,14 +1,14 @@
-//! Why a Parquet file cannot be read.
+//! Errors of reading Parquet files.
 
 use std::path::{Path, PathBuf};
 
-/// Why a Parquet file cannot be read, and which.
+/// An error in a Parquet file, with its path.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", path.display())]
 pub struct ParquetError {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong.
+    /// The problem.
     pub problem: ParquetProblem,
 }
 
@@ -21,48 +21,48 @@ impl ParquetError {
     }
 }
 
-/// What is wrong with a Parquet file.
+/// A problem of a Parquet file.
 #[derive(Debug, thiserror::Error)]
 pub enum ParquetProblem {
-    /// The operating system refuses.
+    /// An I/O error.
     #[error("{0}")]
     Io(#[from] std::io::Error),
-    /// It begins otherwise.
+    /// A file that does not begin with the magic of Parquet.
     #[error("not a Parquet table: it does not begin with PAR1")]
     NotParquet,
-    /// It was cloned without its contents.
+    /// A pointer of Git LFS whose content was not fetched.
     #[error(
         "a pointer of Git LFS in the place of the Parquet table: fetch the table with `git lfs pull`, or download the data \
          set with `hf download`"
     )]
     LfsPointer,
-    /// It ends otherwise.
+    /// A truncated file, which does not end with the magic of Parquet.
     #[error(
         "the Parquet table is torn: it does not end with PAR1, where it says what is in it; copy or download it again"
     )]
     Torn,
-    /// Its footer makes no sense.
+    /// A malformed footer.
     #[error("the footer of the Parquet table is broken: {0}")]
     Footer(&'static str),
-    /// More memory would be needed than is allowed.
+    /// A declared size above the memory limit.
     #[error("{what} of the Parquet table is {bytes} bytes; at most {limit} are held in memory")]
     TooLarge {
-        /// What is so large.
+        /// Name of the part of the file.
         what: &'static str,
-        /// What it declares.
+        /// Declared size \[bytes\].
         bytes: u64,
-        /// What is allowed.
+        /// Limit \[bytes\].
         limit: u64,
     },
-    /// The column is not there.
+    /// A column that the table does not have.
     #[error("the Parquet table has no column {column:?}; it has {known}")]
     NoColumn {
-        /// What was asked for.
+        /// The requested column.
         column: String,
-        /// Those that there are.
+        /// The columns of the table.
         known: String,
     },
-    /// A column holds no numbers, or holds them in a way that is not read.
+    /// A column that is not numeric, or is stored in an unsupported way.
     #[error(
         "column {column:?} is {what}, which is not read: write the table again with pyarrow, \
          `pq.write_table(pq.read_table(FILE), FILE)`"
@@ -70,17 +70,17 @@ pub enum ParquetProblem {
     Unsupported {
         /// The column.
         column: String,
-        /// What it is.
+        /// Description of the type or storage.
         what: String,
     },
-    /// A page of a column makes no sense.
+    /// A malformed page of a column.
     #[error("column {column:?} is damaged from row {row} on: {reason}")]
     Page {
         /// The column.
         column: String,
         /// The first row that cannot be read, from 0.
         row: u64,
-        /// Why.
+        /// Reason.
         reason: &'static str,
     },
 }

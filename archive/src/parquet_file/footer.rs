@@ -1,19 +1,19 @@
-//! The footer: which columns there are, and where their pages lie.
+//! The footer: the columns of a file, and the positions of their pages.
 
 use super::error::ParquetProblem;
 use super::thrift::{Broken, Field, Reader};
 
-/// Most row groups of a file.
+/// Maximum number of row groups of a file.
 /// Resolution: bounds memory; LeRobot writes one for each episode.
 const MAX_GROUPS: usize = 1 << 20;
-/// Most rows of a file.
-/// Resolution: bounds time; an episode of 1 kHz has as many in four hours.
+/// Maximum number of rows of a file.
+/// Resolution: bounds time; an episode at 1 kHz has this number after four hours.
 const MAX_ROWS: u64 = 1 << 24;
-/// Most columns that an error lists.
+/// Maximum number of columns in an error message.
 /// Tuned: by eye, for the length of the message.
 const MOST_NAMES: usize = 40;
 
-/// How numbers are stored.
+/// Storage type of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Physical {
     Int32,
@@ -23,7 +23,7 @@ pub(crate) enum Physical {
 }
 
 impl Physical {
-    /// The size of a number \[bytes\].
+    /// Returns the size of a number \[bytes\].
     pub(super) fn bytes(self) -> usize {
         match self {
             Self::Int32 | Self::Float => 4,
@@ -31,7 +31,7 @@ impl Physical {
         }
     }
 
-    /// The number that stands there; `None` if there are not as many bytes.
+    /// Decodes a number. Returns `None` if `bytes` has another size.
     pub(super) fn number(self, bytes: &[u8]) -> Option<f64> {
         Some(match self {
             Self::Int32 => f64::from(i32::from_le_bytes(bytes.try_into().ok()?)),
@@ -42,36 +42,36 @@ impl Physical {
     }
 }
 
-/// How the pages of a column are compressed.
+/// Compression of the pages of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Codec {
     None,
     Snappy,
     Zstd,
-    /// One that is not read, by its number.
+    /// An unsupported codec, by its number.
     Other(i64),
 }
 
-/// A column that is wanted: numbers, or lists of numbers.
+/// A selected column: numbers, or lists of numbers.
 #[derive(Debug)]
 pub(super) struct Leaf {
     pub(super) name: String,
     pub(super) physical: Physical,
-    /// Its place among all columns of the file.
+    /// Its index among all columns of the file.
     place: usize,
-    /// Definition level of a number that is there.
+    /// Definition level of a number that is not null.
     pub(super) defined: u32,
-    /// In a list, definition level from which on there is an element; 0 outside.
+    /// In a list, lowest definition level of an element; 0 if it is not a list.
     pub(super) element: u32,
     /// Whether it is a list.
     pub(super) is_list: bool,
 }
 
-/// Some rows of all columns.
+/// A row group.
 #[derive(Debug)]
 pub(super) struct Group {
     pub(super) rows: u64,
-    /// Of each wanted column.
+    /// The pages of each selected column.
     pub(super) chunks: Vec<Chunk>,
 }
 
@@ -79,24 +79,24 @@ pub(super) struct Group {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Chunk {
     pub(super) codec: Codec,
-    /// Where they begin in the file \[bytes\].
+    /// Their offset in the file \[bytes\].
     pub(super) start: u64,
     /// Their length \[bytes\].
     pub(super) bytes: u64,
 }
 
-/// What the footer tells.
+/// Contents of the footer.
 #[derive(Debug)]
 pub(super) struct Footer {
-    /// Columns of the outermost level, as far as an error lists them.
+    /// Columns of the outermost level, at most [`MOST_NAMES`].
     pub(super) names: Vec<String>,
-    /// Those that are wanted and there.
+    /// The selected columns that exist.
     pub(super) leaves: Vec<Leaf>,
     pub(super) groups: Vec<Group>,
 }
 
 impl Footer {
-    /// Of a file of `file_bytes`, the columns `wanted`.
+    /// Parses the footer `text` of a file of `file_bytes`, for the columns `wanted`.
     pub(super) fn parse(
         text: &[u8],
         wanted: &[&str],
@@ -182,11 +182,11 @@ struct Open {
     element: u32,
 }
 
-/// The schema as its nodes come, depth first.
+/// The schema, built from its nodes in depth-first order.
 struct Schema<'a> {
     wanted: &'a [&'a str],
     open: Vec<Open>,
-    /// The column of the outermost level to which the next node belongs, if it is wanted.
+    /// The column of the outermost level to which the next node belongs, if it is selected.
     top: Option<String>,
     leaves_seen: usize,
     names: Vec<String>,
@@ -314,7 +314,7 @@ fn group(reader: &mut Reader<'_>, leaves: &[Leaf], file_bytes: u64) -> Result<Gr
     })
 }
 
-/// Where the pages of a column lie; `None` if nobody wants to know.
+/// Parses the position of the pages of a column. Returns `None` if the column is not selected.
 fn chunk(
     reader: &mut Reader<'_>,
     file_bytes: u64,
@@ -334,7 +334,7 @@ fn chunk(
             }
             Ok(())
         })?;
-        // Some writers say 0 where there is no dictionary.
+        // Some writers write 0 if there is no dictionary.
         let start = dictionary
             .filter(|at| (1..data).contains(at))
             .unwrap_or(data);
@@ -356,7 +356,7 @@ fn chunk(
         Ok(())
     };
     reader.fields(|reader, field| match field.id {
-        // The pages lie in another file.
+        // The pages are in another file.
         1 if is_wanted => Err(Broken),
         3 if is_wanted => metadata(reader, field),
         _ => reader.skip(field),

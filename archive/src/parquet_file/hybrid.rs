@@ -1,20 +1,20 @@
-//! Runs and bit-packed numbers
-//! (<https://parquet.apache.org/docs/file-format/data-pages/encodings/>, "RLE"): levels, and places in a dictionary.
+//! Run-length encoded and bit-packed numbers (<https://parquet.apache.org/docs/file-format/data-pages/encodings/>,
+//! "RLE"): levels, and indices of a dictionary.
 
-/// The numbers in a part of a page, one after the other.
+/// Decoder of the numbers in a part of a page.
 #[derive(Debug, Default, Clone)]
 pub(super) struct Hybrid {
     at: usize,
     end: usize,
     width: u32,
-    /// Numbers left of the present run, and their value.
+    /// Numbers left in the current run, and their value.
     run: (u64, u32),
-    /// Numbers left of the present packed ones, and the bit at which the next one begins.
+    /// Numbers left in the current bit-packed group, and the bit offset of the next one.
     packed: (u64, usize),
 }
 
 impl Hybrid {
-    /// Of `width` bits each, in the bytes from `at` to `end` of a page.
+    /// Creates a decoder of numbers of `width` bits each, in the bytes from `at` to `end` of a page.
     pub(super) fn new(at: usize, end: usize, width: u32) -> Self {
         Self {
             at,
@@ -24,7 +24,7 @@ impl Hybrid {
         }
     }
 
-    /// The next number; `None` if there is none, or it makes no sense.
+    /// Returns the next number; `None` at the end, or if it is malformed.
     pub(super) fn next(&mut self, page: &[u8]) -> Option<u32> {
         loop {
             if self.run.0 > 0 {

@@ -1,4 +1,4 @@
-//! A page: its header, and its bytes unpacked.
+//! A page: its header, and its decompressed bytes.
 
 use std::io::Read as _;
 
@@ -8,12 +8,12 @@ use super::hybrid::Hybrid;
 use super::thrift::{Broken, Reader};
 use super::{MAGIC, ParquetFile};
 
-/// Longest page that is read, unpacked \[bytes\].
+/// Maximum size of a page, decompressed \[bytes\].
 /// Resolution: bounds memory; writers begin a new page after 1 MiB.
 const MAX_PAGE_BYTES: u64 = 32 << 20;
-/// As many bytes hold the header of a page, unless it has long statistics.
+/// Bytes first read for the header of a page; enough unless it has long statistics.
 const HEADER_BYTES: u64 = 512;
-/// As many bytes hold it in any case.
+/// Maximum size of the header of a page \[bytes\].
 /// Resolution: bounds memory.
 const MAX_HEADER_BYTES: u64 = 1 << 20;
 
@@ -27,7 +27,7 @@ const DATA: i64 = 0;
 const DICTIONARY: i64 = 2;
 const DATA_2: i64 = 3;
 
-/// What a header says. What it leaves out is -1.
+/// Fields of a page header; -1 for an absent field.
 struct Header {
     kind: i64,
     unpacked: i64,
@@ -35,7 +35,7 @@ struct Header {
     crc: Option<i64>,
     values: i64,
     encoding: i64,
-    /// Bytes of the levels, in pages of version 2.
+    /// Lengths of the levels, in pages of version 2 \[bytes\].
     definition: i64,
     repetition: i64,
     is_packed: bool,
@@ -43,31 +43,31 @@ struct Header {
 
 /// A page of a column.
 pub(super) enum Page {
-    /// Numbers that pages behind it refer to by their place.
+    /// Numbers to which later pages refer by index.
     Dictionary(Vec<u8>),
     /// Numbers.
     Data(DataPage),
-    /// Something else.
+    /// A page of another kind.
     Other,
 }
 
-/// Numbers with their levels, read one after the other.
+/// Numbers with their levels, and the position of the next entry.
 #[derive(Debug, Default)]
 pub(super) struct DataPage {
     bytes: Vec<u8>,
-    /// Numbers and gaps that are left.
+    /// Number of entries not read yet.
     pub(super) left: u64,
     repetition: Option<Hybrid>,
     definition: Option<Hybrid>,
     values: Values,
 }
 
-/// Where the numbers of a page are.
+/// Location of the numbers of a page.
 #[derive(Debug)]
 enum Values {
-    /// From this byte on.
+    /// In the page, from this offset on.
     Plain(usize),
-    /// In the dictionary, at these places.
+    /// In the dictionary, at these indices.
     Dictionary(Hybrid),
 }
 
@@ -77,17 +77,17 @@ impl Default for Values {
     }
 }
 
-/// One place of a column.
+/// One entry of a column.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Entry {
-    /// Whether a row begins with it.
+    /// Whether it is the first of its row.
     pub(super) begins_row: bool,
-    /// Its number: NaN for a gap, `None` where a list is empty.
+    /// Its number: NaN for a null value, `None` for an empty list.
     pub(super) value: Option<f64>,
 }
 
 impl DataPage {
-    /// The next entry; `None` if the page ends before.
+    /// Returns the next entry; `None` if the page ends before it.
     pub(super) fn entry(&mut self, leaf: &Leaf, dictionary: &[u8]) -> Option<Entry> {
         self.left = self.left.checked_sub(1)?;
         let page = &self.bytes;
@@ -121,7 +121,7 @@ impl DataPage {
     }
 }
 
-/// Reads the page at `at` of `chunk`, and where the next one begins.
+/// Reads the page at `at` of `chunk`. Returns it with the offset of the next page.
 pub(super) fn read(
     file: &ParquetFile,
     leaf: &Leaf,
@@ -155,7 +155,7 @@ pub(super) fn read(
     {
         return Err(PageProblem::Damaged("a checksum is wrong"));
     }
-    // Levels of version 2 stand before what is packed.
+    // In version 2, the levels precede the compressed part.
     let levels = if header.kind == DATA_2 {
         size(header.definition)?.saturating_add(size(header.repetition)?)
     } else {
@@ -189,11 +189,11 @@ pub(super) fn read(
 
 const SIZES: &str = "a page declares sizes that do not fit";
 
-/// Why a page cannot be read.
+/// Reason why a page cannot be read.
 pub(super) enum PageProblem {
-    /// It makes no sense.
+    /// A malformed page.
     Damaged(&'static str),
-    /// It is stored in a way that is not read, or the file cannot be read.
+    /// An unsupported page, or an I/O error.
     Refused(ParquetProblem),
 }
 
@@ -203,9 +203,9 @@ impl From<Broken> for PageProblem {
     }
 }
 
-/// The header at `at`, and its length.
+/// Reads the header at `at`. Returns it with its length.
 fn header(file: &ParquetFile, at: u64, end: u64) -> Result<(Header, u64), PageProblem> {
-    // Behind a column there is at least the end of the file.
+    // At least the final magic of the file follows a column.
     let room = (file.bytes - MAGIC.len() as u64)
         .min(end)
         .saturating_sub(at);
@@ -240,7 +240,7 @@ fn parse(reader: &mut Reader<'_>) -> Result<Header, Broken> {
             2 => header.unpacked = reader.integer(field)?,
             3 => header.packed = reader.integer(field)?,
             4 => header.crc = Some(reader.integer(field)?),
-            // Of a page of version 1, of a dictionary, of a page of version 2.
+            // Headers of a page of version 1, of a dictionary and of a page of version 2.
             version @ (5 | 7 | 8) => {
                 Reader::is_struct(field)?;
                 reader.fields(|reader, field| {
@@ -262,7 +262,8 @@ fn parse(reader: &mut Reader<'_>) -> Result<Header, Broken> {
     Ok(header)
 }
 
-/// Unpacks what stands behind the first `levels` bytes, to `unpacked` bytes in all and no more.
+/// Decompresses the part after the first `levels` bytes. The whole page should have `unpacked` bytes, which bounds
+/// the memory.
 fn unpack(
     leaf: &Leaf,
     codec: Codec,
@@ -276,7 +277,7 @@ fn unpack(
     all.extend_from_slice(levels);
     match codec {
         Codec::None => all.extend_from_slice(packed),
-        // A page of gaps alone has nothing to unpack.
+        // A page of null values only has nothing to decompress.
         _ if unpacked == levels.len() => {}
         Codec::Snappy => {
             all.resize(unpacked, 0);
@@ -322,7 +323,7 @@ fn plain_dictionary(leaf: &Leaf, header: &Header) -> Result<(), PageProblem> {
     }
 }
 
-/// Finds levels and numbers in an unpacked page.
+/// Locates the levels and the numbers in a decompressed page.
 fn data(leaf: &Leaf, header: &Header, bytes: Vec<u8>) -> Result<DataPage, PageProblem> {
     let left = u64::try_from(header.values).map_err(|_| PageProblem::Damaged(SIZES))?;
     let (repeats, defines) = (leaf.is_list, leaf.defined > 0);
@@ -351,7 +352,7 @@ fn data(leaf: &Leaf, header: &Header, bytes: Vec<u8>) -> Result<DataPage, PagePr
     let values = match header.encoding {
         PLAIN => Values::Plain(at),
         PLAIN_DICTIONARY | RLE_DICTIONARY => {
-            // A page of gaps alone may have no place in the dictionary, and no width of one.
+            // A page of null values only may have no dictionary indices, and no bit width for them.
             let width = bytes.get(at).copied().unwrap_or(0);
             if width > 32 {
                 return Err(PageProblem::Damaged(

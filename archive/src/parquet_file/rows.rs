@@ -1,4 +1,4 @@
-//! A column row by row.
+//! Sequential access to the rows of a column.
 
 use std::sync::Arc;
 
@@ -6,21 +6,21 @@ use super::ParquetFile;
 use super::error::{ParquetError, ParquetProblem};
 use super::page::{self, DataPage, Entry, Page, PageProblem};
 
-/// Most numbers of a row.
+/// Maximum number of values in a row.
 /// Resolution: bounds memory; a humanoid has some hundreds.
 const MAX_WIDTH: usize = 1 << 14;
 
-/// The rows of a column, one after the other. The present page and its dictionary are held.
+/// Cursor over the rows of a column. It holds the current page and its dictionary.
 pub(crate) struct Rows {
     file: Arc<ParquetFile>,
-    /// Which of the wanted columns.
+    /// Index among the selected columns.
     column: usize,
     group: usize,
-    /// Rows of the group that were read.
+    /// Number of rows read in the current group.
     read: u64,
-    /// Rows of the groups before.
+    /// Number of rows in the preceding groups.
     before: u64,
-    /// Where in the file the next page begins; `None` before the first one of a group.
+    /// File offset of the next page; `None` before the first one of a group.
     next_page: Option<u64>,
     dictionary: Vec<u8>,
     page: DataPage,
@@ -29,7 +29,7 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
-    /// Of the column at the place `column` of those wanted, from the row `first` on.
+    /// Opens the selected column with the index `column`, starting at row `first`.
     pub(super) fn open(
         file: Arc<ParquetFile>,
         column: usize,
@@ -62,7 +62,7 @@ impl Rows {
         Ok(rows)
     }
 
-    /// Puts the numbers of the next row into `row`; `false` if there is none. A gap is NaN.
+    /// Reads the numbers of the next row into `row`; returns `false` at the end. A null value is NaN.
     ///
     /// # Errors
     /// If it cannot be read.
@@ -105,7 +105,7 @@ impl Rows {
         Ok(true)
     }
 
-    /// The next entry if it belongs to the row that has begun.
+    /// Returns the next entry, if it belongs to the current row.
     fn next_of_row(&mut self) -> Result<Option<Entry>, ParquetError> {
         if !self.file.footer.leaves[self.column].is_list {
             return Ok(None);
@@ -118,7 +118,7 @@ impl Rows {
         Ok(entry)
     }
 
-    /// The next entry of the group.
+    /// Returns the next entry of the group.
     fn next_entry(&mut self) -> Result<Option<Entry>, ParquetError> {
         while self.page.left == 0 {
             if !self.turn_page()? {
@@ -131,7 +131,7 @@ impl Rows {
         Ok(Some(entry))
     }
 
-    /// Reads the next page of the group; `false` if there is none.
+    /// Reads the next page of the group; returns `false` at its end.
     fn turn_page(&mut self) -> Result<bool, ParquetError> {
         let chunk = self.file.footer.groups[self.group].chunks[self.column];
         let at = self.next_page.unwrap_or(chunk.start);

@@ -1,5 +1,6 @@
-//! The compact protocol of Thrift (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>),
-//! in which footers and page headers are written. It reads from memory and takes none.
+//! Reader of the compact protocol of Thrift
+//! (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>), in which footers and page
+//! headers are written. It reads from a byte slice and allocates no memory.
 
 /// Deepest nesting of structs and lists.
 /// Resolution: bounds the stack; footers have 7.
@@ -19,11 +20,11 @@ const SET: u8 = 10;
 const MAP: u8 = 11;
 const STRUCT: u8 = 12;
 
-/// The bytes end, or are no Thrift.
+/// Truncated or malformed data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Broken;
 
-/// A place in the bytes.
+/// A position in the bytes.
 #[derive(Debug)]
 pub(super) struct Reader<'a> {
     bytes: &'a [u8],
@@ -158,7 +159,7 @@ impl<'a> Reader<'a> {
         Ok((count, head & 0x0f))
     }
 
-    /// Goes on behind the field.
+    /// Skips the field.
     pub(super) fn skip(&mut self, field: Field) -> Result<(), Broken> {
         match field.kind {
             TRUE | FALSE => Ok(()),
@@ -206,7 +207,7 @@ impl<'a> Reader<'a> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+    #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
     use super::*;
 

@@ -4,18 +4,18 @@ use super::messages::Messages;
 use crate::error::ArchiveError;
 use crate::ros::{JointState, JointStateDecoder};
 
-/// A message with the times of its way.
+/// A message with its receive and send times.
 #[derive(Debug, Clone, Copy)]
 pub struct Stamped<T> {
-    /// When it was received \[ns since the epoch\].
+    /// Receive time \[ns since the epoch\].
     pub log_time_ns: i64,
-    /// When it was sent \[ns since the epoch\].
+    /// Send time \[ns since the epoch\].
     pub publish_time_ns: i64,
     /// The message.
     pub message: T,
 }
 
-/// Joint states of one topic in the order of their log times. One message's memory is used for all.
+/// Joint states of one topic in the order of their log times. All messages share the memory of one.
 pub struct JointStates {
     messages: Messages,
     decoder: JointStateDecoder,
@@ -31,10 +31,10 @@ impl JointStates {
         }
     }
 
-    /// The next joint state, `None` at the end. NaN is left in it.
+    /// Returns the next joint state, or `None` at the end. NaN values are kept.
     ///
-    /// After an [`ArchiveError::Damaged`] or [`ArchiveError::Decode`] it goes on with the next
-    /// message; after any other error there is nothing more.
+    /// After an [`ArchiveError::Damaged`] or [`ArchiveError::Decode`], the next call continues with the next message.
+    /// Any other error ends the sequence.
     pub fn next_state(&mut self) -> Option<Result<Stamped<&JointState>, ArchiveError>> {
         let message = match self.messages.next_message()? {
             Ok(message) => message,

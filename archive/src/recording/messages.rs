@@ -1,4 +1,4 @@
-//! Messages as they come out of a recording, whatever its format.
+//! Sequential access to the messages of a recording in any format.
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -15,15 +15,15 @@ use crate::topic::{Topic, Topics};
 pub struct Message<'a> {
     /// Its topic.
     pub topic: &'a Topic,
-    /// The topic's place in [`Recording::topics`](super::Recording::topics).
+    /// Index of the topic in [`Recording::topics`](super::Recording::topics).
     pub topic_index: usize,
-    /// When it was received \[ns since the epoch\].
+    /// Receive time \[ns since the epoch\].
     pub log_time_ns: i64,
-    /// When it was sent \[ns since the epoch\]; the log time where the format does not say.
+    /// Send time \[ns since the epoch\]; the log time if the format has no send time.
     pub publish_time_ns: i64,
-    /// The publisher's number for it, 0 where the format has none.
+    /// Sequence number of the publisher; 0 if the format has none.
     pub sequence: u32,
-    /// Where it lies: byte of the file where it or its chunk begins, row, or line.
+    /// Position in the file: offset of the message or of its chunk \[bytes\], row, or line.
     pub at: u64,
     /// The message itself, in the topic's encoding.
     pub body: &'a [u8],
@@ -42,20 +42,20 @@ impl Message<'_> {
         decoded.map_err(|source| self.error(source))
     }
 
-    /// Decodes it over a message that is there already, whose memory is used again.
+    /// Decodes it into an existing message, whose memory is reused.
     ///
     /// # Errors
-    /// [`ArchiveError::Decode`] if it is not an `M`; `message` is then void.
+    /// [`ArchiveError::Decode`] if it is not an `M`; the content of `message` is then undefined.
     pub fn decode_into<M: ros::Message>(&self, message: &mut M) -> Result<(), ArchiveError> {
         let body = self.sound_body();
         let decoded = body.and_then(|body| ros::decode_into(body, message));
         decoded.map_err(|source| self.error(source))
     }
 
-    /// Decodes a joint state of its topic's type over one that is there already.
+    /// Decodes a joint state of its topic's type into an existing one.
     ///
     /// # Errors
-    /// [`ArchiveError::Decode`] if it is not of that type; `state` is then void.
+    /// [`ArchiveError::Decode`] if it is not of that type; the content of `state` is then undefined.
     pub fn joint_state_into(
         &self,
         decoder: &mut ros::JointStateDecoder,
@@ -95,7 +95,7 @@ pub struct Messages {
     topics: Arc<Topics>,
     cursor: Box<dyn Cursor>,
     bodies: Bodies,
-    /// Log times of the messages that are given.
+    /// Range of log times of the messages to return.
     within_ns: RangeInclusive<i64>,
     ended: bool,
 }
@@ -117,10 +117,10 @@ impl Messages {
         }
     }
 
-    /// The next message, `None` at the end.
+    /// Returns the next message, or `None` at the end.
     ///
-    /// [`ArchiveError::Damaged`] stands in the place of what cannot be read: whoever asks again is
-    /// given what comes behind it. After any other error there is nothing more.
+    /// An unreadable part is returned as [`ArchiveError::Damaged`], and the next call continues behind it. Any other
+    /// error ends the sequence.
     pub fn next_message(&mut self) -> Option<Result<Message<'_>, ArchiveError>> {
         while !self.ended {
             match self.cursor.advance() {
@@ -141,8 +141,8 @@ impl Messages {
         None
     }
 
-    /// Chunks of an MCAP file or a bag of ROS 1 that have been read so far. Messages of an MCAP file that lie in no chunk
-    /// count as one, up to the next chunk.
+    /// Returns the number of chunks of an MCAP file or a bag of ROS 1 read so far. A run of messages of an MCAP file
+    /// outside chunks counts as one chunk.
     pub fn chunks_read(&self) -> u64 {
         self.cursor.chunks_read()
     }

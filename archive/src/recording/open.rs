@@ -1,4 +1,4 @@
-//! What lies at a path, and how it is opened.
+//! Opening of the recording at a path, with detection of its format.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -27,8 +27,8 @@ impl Recording {
     /// (`.csv`) with a recognised header or a file `NAME.columns.yaml`, or an episode of a LeRobot data
     /// set (`DATASET/episode_000003`, or the set's folder or Parquet file if it holds one episode).
     ///
-    /// Of an MCAP file or a bag of ROS 1, only the index is read if it has a sound one; else all of
-    /// it, once. A database is counted through once, an episode is read through once.
+    /// Of an MCAP file or a bag of ROS 1 with a sound index, only the index is read; without one, the whole file is
+    /// read once. The rows of a database are counted once, and an episode is read once.
     ///
     /// # Errors
     /// [`ArchiveError::Io`]; [`ArchiveError::UnknownFormat`]; [`ArchiveError::Unreadable`] if not
@@ -214,12 +214,12 @@ impl Recording {
     /// Opens the table at `path`, with `joints` as the names that its columns stand for unless the
     /// mapping has its own. Its rows appear as joint states on the topic `/joint_states`.
     ///
-    /// All of it is read and checked: once, or twice if the unit of its time has to be recognised. What was recognised
-    /// is in [`Recording::remarks`].
+    /// All of it is read and checked: once, or twice if the unit of its time has to be recognised.
+    /// [`Recording::remarks`] reports what was recognised.
     ///
     /// # Errors
     /// [`ArchiveError::Io`]; [`ArchiveError::CsvMapping`] if the mapping does not fit the table;
-    /// [`ArchiveError::Csv`] with the first line that makes no sense.
+    /// [`ArchiveError::Csv`] with the first malformed line.
     pub fn open_csv(
         path: impl AsRef<Path>,
         mapping: &CsvMapping,
@@ -244,7 +244,7 @@ impl Recording {
     }
 }
 
-/// The one topic of what is no bag.
+/// Returns the only topic of a table.
 fn joint_states(name: &str, message_count: u64) -> Topics {
     let mut topics = Topics::default();
     let topic = Topic {
@@ -259,7 +259,7 @@ fn joint_states(name: &str, message_count: u64) -> Topics {
     topics
 }
 
-/// The error for a bag with no file that can be opened: the compressed ones come first, because the user can unpack them.
+/// Returns the error for a bag without a readable file: compressed files first, because the user can unpack them.
 fn none_of(folder: &Path, mut compressed: Vec<ArchiveError>, damage: &[Damage]) -> ArchiveError {
     let count = compressed.len();
     if let Some(mut error) = compressed.drain(..).next() {
@@ -287,7 +287,7 @@ fn missing(file: &Path, error: &ArchiveError) -> Damage {
     }
 }
 
-/// The length of a file that has just been read; 0 if it has gone since.
+/// Returns the length of a file that has just been read; 0 if it has been removed since.
 fn length(path: &Path) -> u64 {
     std::fs::metadata(path).map_or(0, |metadata| metadata.len())
 }

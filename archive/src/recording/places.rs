@@ -1,19 +1,19 @@
-//! Which recordings a path means, and on which files they depend.
+//! The recordings at a path, and the files on which they depend.
 
 use std::path::{Path, PathBuf};
 
 use crate::error::ArchiveError;
 use crate::lerobot::{self, Place};
 
-/// The recordings at `path`: the episodes of a LeRobot data set of several, or `path` itself.
+/// Returns the recordings at `path`: the episodes of a LeRobot data set of several, or `path` itself.
 ///
 /// # Errors
-/// If the data set does not tell its episodes.
+/// If the data set does not list its episodes.
 pub fn recordings_at(path: &Path) -> Result<Vec<PathBuf>, ArchiveError> {
     match lerobot::locate(path)? {
         Some(Place::Set(root)) => {
             let numbers = lerobot::episodes(&root)?;
-            // One of one goes by the name of the data set.
+            // A single episode has the name of the data set.
             if numbers.len() == 1 {
                 return Ok(vec![path.to_owned()]);
             }
@@ -24,8 +24,8 @@ pub fn recordings_at(path: &Path) -> Result<Vec<PathBuf>, ArchiveError> {
     }
 }
 
-/// What a recording is called: as its file without the ending, as its folder, or as its data set and its number there,
-/// `DATASET_episode_000003`.
+/// Returns the name of a recording: the file name without extension, the folder name, or the data set with the number
+/// of the episode, `DATASET_episode_000003`.
 pub fn name_of(path: &Path) -> String {
     if let Ok(Some(Place::Episode(root, number))) = lerobot::locate(path) {
         let root = root.canonicalize().unwrap_or(root);
@@ -41,23 +41,23 @@ pub fn name_of(path: &Path) -> String {
     name.unwrap_or_else(|| "recording".to_owned())
 }
 
-/// Whether there may be a recording at `path`: an episode of a LeRobot data set has a path, but perhaps no file of that
-/// path.
+/// Returns whether there may be a recording at `path`. An episode of a LeRobot data set has a path, but not
+/// necessarily a file of that name.
 pub fn is_there(path: &Path) -> bool {
     path.exists() || matches!(lerobot::locate(path), Ok(Some(_)))
 }
 
-/// On what a recording, or another file, depends.
+/// Files on which a recording, or another file, depends.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Sources {
-    /// The file itself, the files of the folder in the order of their names, or the rows of an episode and what says
-    /// what they are.
+    /// The file itself, the files of the folder in the order of their names, or the rows of an episode and their
+    /// descriptions.
     pub files: Vec<PathBuf>,
-    /// The number of the episode of a LeRobot data set: a file may hold several.
+    /// The number of the episode of a LeRobot data set, because a file may hold several.
     pub episode: Option<u64>,
 }
 
-/// On what the recording, or another file, at `path` depends.
+/// Returns the files on which the recording, or another file, at `path` depends.
 ///
 /// # Errors
 /// If a folder cannot be read, or has no such episode.

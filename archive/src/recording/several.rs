@@ -1,4 +1,4 @@
-//! The messages of several recordings as if they were one.
+//! Merging of the messages of several recordings.
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -10,33 +10,35 @@ use crate::error::ArchiveError;
 /// One of several recordings.
 pub(super) struct Part {
     pub(super) recording: Recording,
-    /// What the whole calls each of its topics.
+    /// Index of each of its topics in the merged list.
     pub(super) topics: Vec<usize>,
 }
 
-/// Opens a part when its time has come and closes it when it is done: a bag may have thousands.
+/// Cursor over the merged messages. It opens a part at its start time and closes it at its end, because a bag may
+/// have thousands of parts.
 pub(super) struct SeveralCursor {
     parts: Arc<Vec<Part>>,
     wanted: Vec<bool>,
     within_ns: RangeInclusive<i64>,
-    /// Parts not opened yet; the last one begins first.
+    /// Parts not opened yet, in descending order of start time.
     waiting: Vec<usize>,
     open: Vec<Open>,
-    /// Index into `open`: whose message was given last.
+    /// Index into `open` of the part with the current message.
     current: Option<usize>,
-    /// Chunks read in the parts that are done.
+    /// Number of chunks read in the closed parts.
     chunks_before: u64,
 }
 
 struct Open {
     part: usize,
     cursor: Box<dyn Cursor>,
-    /// Whether it stands on a message that is to be given.
+    /// Whether the cursor is at a message that has not been returned yet.
     ready: bool,
 }
 
 impl SeveralCursor {
-    /// Over the topics marked in `wanted`, by their place in the whole. What lies outside `within_ns` may be left out.
+    /// Creates a cursor over the topics marked in `wanted`, by their index in the merged list. Messages outside
+    /// `within_ns` may be omitted.
     pub(super) fn new(
         parts: Arc<Vec<Part>>,
         wanted: &[bool],
@@ -58,7 +60,7 @@ impl SeveralCursor {
         }
     }
 
-    /// Brings every open part onto its next message; closes those that have none.
+    /// Advances every open part to its next message, and closes those that have none.
     fn get_ready(&mut self) -> Result<(), ArchiveError> {
         let mut i = 0;
         while let Some(open) = self.open.get_mut(i) {
@@ -73,7 +75,7 @@ impl SeveralCursor {
         Ok(())
     }
 
-    /// The open part whose message comes first, and the message's log time.
+    /// Returns the open part whose message comes first, and the log time of that message.
     fn first(&self) -> Option<(usize, i64)> {
         let key = |i: &usize| {
             let open = &self.open[*i];

@@ -1,35 +1,35 @@
-//! Why a recording cannot be repaired.
+//! Errors of repairing a recording.
 
 use std::path::PathBuf;
 
 use crate::error::ArchiveError;
 use crate::mcap_write::WriteError;
 
-/// Why a recording cannot be repaired.
+/// An error of repairing a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RepairError {
-    /// It cannot be read at all.
+    /// A recording that cannot be read at all.
     #[error(transparent)]
     Read(#[from] ArchiveError),
-    /// The new file cannot be written.
+    /// A new file that cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// Something lies where the new file should go.
+    /// An output path that already exists.
     #[error("{} is there already; give another name with --out", path.display())]
     Exists {
-        /// Where.
+        /// The output path.
         path: PathBuf,
     },
-    /// It grows while it is read.
+    /// A file that is still being written.
     #[error("{}: a process is still writing it: repair it when that has ended", path.display())]
     BeingWritten {
-        /// Which.
+        /// The file.
         path: PathBuf,
     },
-    /// A folder without any.
+    /// A folder without MCAP files.
     #[error("{}: a folder without MCAP files (.mcap, .mcap.part)", path.display())]
     NothingThere {
-        /// Which.
+        /// The folder.
         path: PathBuf,
     },
 }

@@ -1,4 +1,4 @@
-//! A folder of pieces as one bag.
+//! Repair of a folder of MCAP files to one bag.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -13,18 +13,18 @@ use crate::mcap_write::{self, Written};
 use crate::recording::Recording;
 use crate::whole_file::{self, Existing};
 
-/// What [`repair_folder`] has made.
+/// Result of [`repair_folder`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RepairedFolder {
     /// The new folder, a bag that rosbag2 opens.
     pub path: PathBuf,
-    /// Its files; one that was whole is the old file under a second name, or a copy of it.
+    /// Its files; an intact one is a hard link to the old file, or a copy of it.
     pub files: Vec<Repaired>,
     /// Files of the old folder that cannot be read at all.
     pub damage: Vec<Damage>,
 }
 
-/// Where [`repair_folder`] puts its folder: `bag.repaired` beside `bag`.
+/// Returns the default path of a repaired folder: `bag.repaired` next to `bag`.
 pub fn repaired_folder_path(folder: &Path) -> PathBuf {
     let mut name = folder.file_name().map_or_else(
         || OsString::from("recordings"),
@@ -34,16 +34,15 @@ pub fn repaired_folder_path(folder: &Path) -> PathBuf {
     folder.parent().unwrap_or(Path::new("")).join(name)
 }
 
-/// Makes the bag `to` of the MCAP files in the folder `from`: files that are whole as they are, torn
-/// ones rebuilt, the pieces that one recorder left as it died and was started again joined, and
-/// `metadata.yaml` over all. `from` is not touched.
+/// Creates the bag `to` from the MCAP files in the folder `from`. Intact files are kept as they are, torn ones are
+/// rebuilt, and the pieces of a recorder that crashed and was restarted are joined. A `metadata.yaml` describes all
+/// of them. `from` is not modified.
 ///
-/// Pieces belong together if they have one name but for its number (`a.mcap`, `a.1.mcap.part`), the
-/// same provenance, and each but the last of them is torn.
+/// Pieces belong together if their names differ only in the number (`a.mcap`, `a.1.mcap.part`), their provenance is
+/// the same, and all but the last are torn.
 ///
 /// # Errors
-/// If there is no MCAP file, one is being written, or the new folder is there already or cannot be
-/// written.
+/// If there is no MCAP file, one is being written, or the new folder already exists or cannot be written.
 pub fn repair_folder(from: &Path, to: &Path) -> Result<RepairedFolder, RepairError> {
     if to.try_exists().map_err(ArchiveError::io(to))? {
         return Err(RepairError::Exists {
@@ -73,7 +72,7 @@ pub fn repair_folder(from: &Path, to: &Path) -> Result<RepairedFolder, RepairErr
     work.push(".part");
     let work = PathBuf::from(work);
     if work.is_dir() {
-        // What a repair that was interrupted had made.
+        // Output of an interrupted repair.
         fs::remove_dir_all(&work).map_err(ArchiveError::io(&work))?;
     }
     whole_file::create_folder(&work).map_err(ArchiveError::io(&work))?;
@@ -99,7 +98,7 @@ fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, ArchiveError> {
     for entry in fs::read_dir(folder).map_err(ArchiveError::io(folder))? {
         let path = entry.map_err(ArchiveError::io(folder))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        // What a repair has not finished is all in the file that it was made from.
+        // The source of an unfinished repair still holds all of its data.
         let unfinished = name.ends_with(".repairing.mcap.part");
         if (name.ends_with(".mcap") || name.ends_with(".mcap.part")) && !unfinished {
             files.push(path);
@@ -109,14 +108,14 @@ fn mcap_files(folder: &Path) -> Result<Vec<PathBuf>, ArchiveError> {
     Ok(files)
 }
 
-/// A file of the folder, with what says where it belongs.
+/// A file of the folder, with the facts that decide which pieces belong together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Piece {
     path: PathBuf,
     start_ns: Option<i64>,
-    /// Its writer died, or that of what it was repaired from.
+    /// Whether its writer crashed, or the writer of the file from which it was repaired.
     torn: bool,
-    /// It can be taken as it is.
+    /// Whether it can be used as it is.
     whole: bool,
     provenance: Option<BTreeMap<String, String>>,
 }
@@ -136,7 +135,7 @@ impl Piece {
         })
     }
 
-    /// Its name without the number that tells it from its like: `a` for `a.1.mcap.part`.
+    /// Returns its name without the number of the piece: `a` for `a.1.mcap.part`.
     fn base(&self) -> String {
         let name = stem(&self.path);
         match name.rsplit_once('.') {
@@ -146,7 +145,7 @@ impl Piece {
     }
 }
 
-/// The pieces that belong together, in the order of their times.
+/// Groups the pieces that belong together, in the order of their times.
 fn chains(mut pieces: Vec<Piece>) -> Vec<Vec<Piece>> {
     pieces.sort_by_key(|piece| (piece.base(), piece.start_ns, piece.path.clone()));
     let mut chains: Vec<Vec<Piece>> = Vec::new();
@@ -165,7 +164,7 @@ fn chains(mut pieces: Vec<Piece>) -> Vec<Vec<Piece>> {
     chains
 }
 
-/// Puts a chain into `folder` as one file, by the name of its last piece.
+/// Puts a chain into `folder` as one file, named after its only piece or the common part of their names.
 fn place(chain: &[Piece], folder: &Path) -> Result<Repaired, RepairError> {
     let paths: Vec<&Path> = chain.iter().map(|piece| piece.path.as_path()).collect();
     let name = match chain {
@@ -181,7 +180,7 @@ fn place(chain: &[Piece], folder: &Path) -> Result<Repaired, RepairError> {
     else {
         return repair(&paths, &to);
     };
-    // The same bytes under a second name; a copy where the file system knows no such thing.
+    // A hard link, or a copy if the file system does not support links.
     if fs::hard_link(path, &to).is_err() {
         fs::copy(path, &to).map_err(ArchiveError::io(&to))?;
     }

@@ -12,35 +12,35 @@ const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 /// Physical: one byte less than the largest alignment.
 pub(super) const MAX_PADDING: usize = 7;
 
-/// Why the bytes are not the message they should be.
+/// An error of decoding a message.
 #[derive(Debug, thiserror::Error)]
 pub enum DecodeError {
-    /// Not even an encapsulation header.
+    /// Fewer bytes than an encapsulation header.
     #[error("{len} bytes are too short for a CDR message")]
     TooShort {
-        /// Bytes there are.
+        /// Number of bytes.
         len: usize,
     },
-    /// Some other encoding than plain CDR.
+    /// An encoding other than plain CDR.
     #[error("{}", of_encapsulation(*id))]
     Encapsulation {
         /// The first two bytes.
         id: [u8; 2],
     },
-    /// The bytes do not hold the fields of the type.
+    /// Bytes that do not hold the fields of the type.
     #[error("byte {at} of {len}: {source}")]
     Fields {
-        /// Where reading stopped.
+        /// Offset at which reading stopped.
         at: usize,
-        /// Bytes there are.
+        /// Number of bytes.
         len: usize,
-        /// What was wrong.
+        /// The CDR error.
         source: cdr_encoding::Error,
     },
-    /// More bytes than the type has fields for.
+    /// More bytes than the fields of the type.
     #[error("{extra} bytes are left over after {type_name}")]
     LeftOver {
-        /// How many.
+        /// Number of excess bytes.
         extra: usize,
         /// The type that was read.
         type_name: &'static str,
@@ -53,7 +53,7 @@ pub enum DecodeError {
         /// Nanoseconds.
         nanosec: u32,
     },
-    /// An array that does not fit the names.
+    /// An array whose length differs from the number of names.
     #[error(
         "`{array}` has {} for {} ({}): it is unknown which belongs to which. Make the driver send a value for each name, or only the names that it has values for, and record again",
         counted(*len, ENTRY),
@@ -70,7 +70,7 @@ pub enum DecodeError {
         /// The first few names.
         first_names: Vec<String>,
     },
-    /// Values without any name.
+    /// Values without names.
     #[error("`name` is empty, but `{array}` has {}: their joints are unknown", counted(*len, ENTRY))]
     NoNames {
         /// Name of the array.
@@ -87,10 +87,10 @@ pub enum DecodeError {
         /// Reason.
         reason: &'static str,
     },
-    /// Not a ROS 1 message of its type.
+    /// A body that is not a ROS 1 message of its type.
     #[error("the {len} bytes are not a {type_name} in the encoding of ROS 1")]
     Ros1 {
-        /// Bytes there are.
+        /// Number of bytes.
         len: usize,
         /// Type of the topic.
         type_name: &'static str,
@@ -105,12 +105,12 @@ fn counted(count: usize, [one, many]: [&str; 2]) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }
 
-/// Names that an error lists.
+/// Maximum number of names in an error message.
 /// Resolution: what a person reads.
 const MOST_NAMED: usize = 8;
 
 impl DecodeError {
-    /// An array of `len` entries that does not fit `names`.
+    /// Returns the error for an array of `len` entries that does not match `names`.
     pub(super) fn array_length(array: &'static str, len: usize, names: &[String]) -> Self {
         Self::ArrayLength {
             array,
@@ -121,7 +121,7 @@ impl DecodeError {
     }
 }
 
-/// The first names, of `count` in total.
+/// Lists the first names, of `count` in total.
 fn listed(first_names: &[String], count: usize) -> String {
     let names = first_names.join(", ");
     match count - first_names.len() {
@@ -141,7 +141,7 @@ fn of_encapsulation([first, second]: [u8; 2]) -> String {
     )
 }
 
-/// Why a message cannot be written.
+/// An error of encoding a message.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {type_name}: {source}")]
 pub struct EncodeError {
@@ -149,9 +149,9 @@ pub struct EncodeError {
     source: cdr_encoding::Error,
 }
 
-/// The message of type `M` in `body`.
+/// Decodes the message of type `M` in `body`.
 ///
-/// Memory is bounded by the length of `body`, whatever counts stand in it.
+/// Memory is bounded by the length of `body`, whatever counts it declares.
 ///
 /// # Errors
 /// If `body` is not an `M`, or breaks its rules ([`Message::check`]).
@@ -161,10 +161,10 @@ pub fn decode<M: Message>(body: &[u8]) -> Result<M, DecodeError> {
     Ok(message)
 }
 
-/// As [`decode`], over a message that is there already, whose memory is used again.
+/// Like [`decode`], but into an existing message, whose memory is reused.
 ///
 /// # Errors
-/// As [`decode`]; the message is then void.
+/// As [`decode`]; the content of the message is then undefined.
 pub fn decode_into<M: Message>(body: &[u8], message: &mut M) -> Result<(), DecodeError> {
     let Some((header, fields)) = body.split_first_chunk::<4>() else {
         return Err(DecodeError::TooShort { len: body.len() });
@@ -197,10 +197,10 @@ fn read<M: Message, BO: ByteOrder>(fields: &[u8], message: &mut M) -> Result<(),
     Ok(())
 }
 
-/// Writes `message` as little-endian CDR into `body`, whose former content is dropped.
+/// Encodes `message` as little-endian CDR into `body`, and replaces its content.
 ///
 /// # Errors
-/// If a string or array is longer than the format can say.
+/// If a string or array is longer than the format supports.
 pub fn encode<M: Message>(message: &M, body: &mut Vec<u8>) -> Result<(), EncodeError> {
     body.clear();
     body.extend_from_slice(&ENCAPSULATION);

@@ -5,24 +5,24 @@ use serde::{Deserialize, Serialize};
 use super::header::{HEADER, Header, TIME};
 use super::{DecodeError, Message};
 
-/// How bad a [`DiagnosticStatus`] is.
+/// Severity of a [`DiagnosticStatus`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Level {
-    /// All is well.
+    /// Normal operation.
     Ok = 0,
-    /// To be looked at.
+    /// A condition that needs attention.
     Warn = 1,
-    /// Wrong.
+    /// A fault.
     Error = 2,
-    /// Nothing was heard for too long.
+    /// An outdated report.
     Stale = 3,
 }
 
 /// `diagnostic_msgs/msg/KeyValue`.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct KeyValue {
-    /// What is told.
+    /// Name of the value.
     pub key: String,
     /// Its value as text.
     pub value: String,
@@ -33,11 +33,11 @@ pub struct KeyValue {
 pub struct DiagnosticStatus {
     /// A [`Level`] as its number.
     pub level: u8,
-    /// Who reports.
+    /// Name of the reporting component.
     pub name: String,
-    /// What, in words.
+    /// Description of the status.
     pub message: String,
-    /// The device or part it is about.
+    /// The device or part to which it applies.
     pub hardware_id: String,
     /// Details.
     pub values: Vec<KeyValue>,
@@ -48,7 +48,7 @@ pub struct DiagnosticStatus {
 pub struct DiagnosticArray {
     /// Time.
     pub header: Header,
-    /// What is reported.
+    /// The reported statuses.
     pub status: Vec<DiagnosticStatus>,
 }
 

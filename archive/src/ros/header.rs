@@ -22,8 +22,7 @@ pub struct Time {
 }
 
 impl Time {
-    /// The time `ns` nanoseconds after the epoch; what lies outside of 1970 to 2038 is moved to the
-    /// nearer end, which is all that the type can hold.
+    /// Creates the time `ns` nanoseconds after the epoch, clamped to the range of the type, 1970 to 2038.
     pub fn from_ns(ns: i64) -> Self {
         let ns = ns.clamp(0, i64::from(i32::MAX) * NS_PER_S + NS_PER_S - 1);
         Self {
@@ -32,12 +31,12 @@ impl Time {
         }
     }
 
-    /// Nanoseconds since the epoch.
+    /// Returns the nanoseconds since the epoch.
     pub fn ns(self) -> i64 {
         i64::from(self.sec) * NS_PER_S + i64::from(self.nanosec)
     }
 
-    /// Not before the epoch, and less than a second of nanoseconds.
+    /// Checks that it is not before the epoch, and has less than a second of nanoseconds.
     pub(super) fn check(self) -> Result<(), DecodeError> {
         if self.sec < 0 || i64::from(self.nanosec) >= NS_PER_S {
             return Err(DecodeError::Stamp {
@@ -52,9 +51,9 @@ impl Time {
 /// `std_msgs/msg/Header`.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Header {
-    /// When what the message says was measured.
+    /// Time of the measurement.
     pub stamp: Time,
-    /// The frame it is meant in.
+    /// Frame of the data.
     pub frame_id: String,
 }
 

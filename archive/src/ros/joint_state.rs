@@ -52,12 +52,12 @@ impl Message for JointState {
         Ok(())
     }
 
-    // The one message that comes a thousand times a second.
+    // Joint states arrive up to a thousand times a second.
     fn read_alike(&mut self, fields: &[u8]) -> bool {
         self.read_numbers(&mut Walk { fields, at: 0 }).is_some()
     }
 
-    // Field by field into the memory that is there already.
+    // Field by field, so that the existing memory is reused.
     fn read<BO: ByteOrder>(
         &mut self,
         from: &mut CdrDeserializer<'_, BO>,
@@ -72,14 +72,14 @@ impl Message for JointState {
 }
 
 impl JointState {
-    /// Places in `name` of the first joint that stands there more than once: its first and its second. Which of their
-    /// values hold, nobody knows.
+    /// Returns the first two indices in `name` of the first joint that occurs more than once. Its values are
+    /// ambiguous.
     pub fn named_twice(&self) -> Option<[usize; 2]> {
         first_twice(&self.name)
     }
 
-    /// Stamp and numbers of a message that names the same frame and joints as `self`; `None` if it does not, or ends
-    /// otherwise than its counts say.
+    /// Reads the stamp and the numbers of a message with the frame and the joints of `self`. Returns `None` if they
+    /// differ, or if the length does not match the counts.
     fn read_numbers(&mut self, from: &mut Walk<'_>) -> Option<()> {
         self.header.stamp = Time {
             sec: from.word()?.cast_signed(),
@@ -97,7 +97,7 @@ impl JointState {
     }
 }
 
-/// Goes through the fields of a little-endian message.
+/// Cursor over the fields of a little-endian message.
 struct Walk<'a> {
     fields: &'a [u8],
     at: usize,
@@ -115,7 +115,7 @@ impl Walk<'_> {
         Some(u32::from_le_bytes(self.take(4, 4)?.try_into().ok()?))
     }
 
-    /// Passes a string that is `text`.
+    /// Skips a string that equals `text`.
     fn pass(&mut self, text: &str) -> Option<()> {
         let len = self.word()? as usize;
         let (nul, bytes) = self.take(1, len)?.split_last()?;
@@ -133,7 +133,7 @@ impl Walk<'_> {
     }
 }
 
-/// Places of the first name that stands there more than once: its first and its second.
+/// Returns the first two indices of the first name that occurs more than once.
 pub fn first_twice(names: &[String]) -> Option<[usize; 2]> {
     let mut seen = BTreeMap::new();
     let mut places = names.iter().enumerate();
@@ -142,7 +142,7 @@ pub fn first_twice(names: &[String]) -> Option<[usize; 2]> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+    #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
     use super::super::{decode, decode_into, encode};
     use super::*;

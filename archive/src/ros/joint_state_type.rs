@@ -1,4 +1,4 @@
-//! The message types that carry joint states, and how each becomes a [`JointState`].
+//! The message types that carry joint states, and their conversion to a [`JointState`].
 
 use super::{DecodeError, DynamicJointState, JointState, Message, decode_into};
 
@@ -12,15 +12,15 @@ pub enum JointStateType {
 }
 
 impl JointStateType {
-    /// All of them, the usual one first.
+    /// All types, the most common one first.
     pub const ALL: [Self; 2] = [Self::JointState, Self::DynamicJointState];
 
-    /// The type of this name, e.g. `sensor_msgs/msg/JointState`.
+    /// Returns the type of this name, e.g. `sensor_msgs/msg/JointState`.
     pub fn of(type_name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|each| each.name() == type_name)
     }
 
-    /// Its name, e.g. `sensor_msgs/msg/JointState`.
+    /// Returns its name, e.g. `sensor_msgs/msg/JointState`.
     pub fn name(self) -> &'static str {
         match self {
             Self::JointState => JointState::TYPE,
@@ -28,17 +28,17 @@ impl JointStateType {
         }
     }
 
-    /// The names of all of them, for a message to people.
+    /// Returns the names of all types, for error messages.
     pub fn names() -> String {
         Self::ALL.map(Self::name).join(" or ")
     }
 
-    /// Its name on DDS.
+    /// Returns its name on DDS.
     pub fn dds_type(self) -> String {
         super::dds_type(self.name())
     }
 
-    /// Its type hash.
+    /// Returns its type hash.
     pub fn hash(self) -> &'static str {
         match self {
             Self::JointState => JointState::TYPE_HASH,
@@ -47,19 +47,19 @@ impl JointStateType {
     }
 }
 
-/// Reads joint states of any type. One message's memory is used for all.
+/// Decoder of joint states of any type. All messages share the memory of one.
 #[derive(Debug, Default)]
 pub struct JointStateDecoder {
     dynamic: DynamicJointState,
-    /// Of the last message whose type nobody told.
+    /// Type of the last message that was decoded by [`JointStateDecoder::guess_into`].
     last: Option<JointStateType>,
 }
 
 impl JointStateDecoder {
-    /// Decodes a message of this type over `state`.
+    /// Decodes a message of this type into `state`.
     ///
     /// # Errors
-    /// If `body` is not such a message; `state` is then void.
+    /// If `body` is not such a message; the content of `state` is then undefined.
     pub fn decode_into(
         &mut self,
         of: JointStateType,
@@ -76,11 +76,12 @@ impl JointStateDecoder {
         }
     }
 
-    /// Decodes a message whose type nobody tells over `state`, and tells its type. No message is of both types: their
-    /// lengths differ.
+    /// Decodes a message of undeclared type into `state`, and returns its type. No message is valid as both types,
+    /// because their lengths differ.
     ///
     /// # Errors
-    /// Why it is not of the type that the last message had, if it is of none; `state` is then void.
+    /// The decoding error for the type of the last message, if the message is of no type; the content of `state` is
+    /// then undefined.
     pub fn guess_into(
         &mut self,
         body: &[u8],
@@ -103,7 +104,7 @@ impl JointStateDecoder {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+    #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
     use super::super::{InterfaceValue, encode};
     use super::*;

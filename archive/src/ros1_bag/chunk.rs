@@ -1,21 +1,21 @@
-//! A chunk: its records, unpacked.
+//! A chunk: its decompressed records.
 
 use std::io::{self, Read};
 
 use super::record::{Header, Records, Step, op};
 use crate::chunks::{MAX_LOADED_BYTES, too_long};
 
-/// Reads chunks; keeps its memory from one to the next.
+/// Reader of chunks, with memory that is reused from one to the next.
 #[derive(Default)]
 pub(super) struct Unpacker {
     packed: Vec<u8>,
 }
 
 impl Unpacker {
-    /// Reads the chunk at `at` into `records`. One that is torn is read as far as it goes.
+    /// Reads the chunk at `at` into `records`. A truncated chunk is read up to its end.
     ///
     /// # Errors
-    /// The inner one, in words, if it cannot be unpacked; `records` is then void.
+    /// The inner error is the reason why it cannot be decompressed; the content of `records` is then undefined.
     pub(super) fn read(
         &mut self,
         from: &mut Records,
@@ -54,7 +54,7 @@ fn unpack(
     if size > MAX_LOADED_BYTES as u64 {
         return Err(format!("it unpacks to {}", too_long(size)));
     }
-    // No more than it says, however much is in it: memory is taken as bytes come.
+    // At most the declared size, whatever the content: memory is allocated as bytes are decompressed.
     let limit = size + 1;
     let read = match header.get("compression").unwrap_or_default() {
         b"none" => packed.take(limit).read_to_end(records),

@@ -1,4 +1,4 @@
-//! The messages of a bag one after the other.
+//! Sequential access to the messages of a bag.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -12,7 +12,7 @@ use crate::chunks::{ChunkCursor, Chunks, Entry, Loaded, Order, Place};
 use crate::damage::DamageKind;
 use crate::error::ArchiveError;
 
-/// The chunks of a bag as they are loaded.
+/// Loader of the chunks of a bag.
 pub(crate) struct Ros1Chunks {
     bag: Arc<Ros1Bag>,
     records: Records,
@@ -21,7 +21,7 @@ pub(crate) struct Ros1Chunks {
     lister: Lister,
 }
 
-/// Over the connections to which `topic` gives a number.
+/// Creates a cursor over the connections for which `topic` returns a number.
 pub(crate) fn ros1_cursor(
     bag: Arc<Ros1Bag>,
     topic: impl Fn(u32) -> Option<usize>,
@@ -35,7 +35,7 @@ pub(crate) fn ros1_cursor(
         connections: connections.collect(),
     };
     let wanted = |number: &u32| {
-        // A connection that nobody declared is damage to be told.
+        // An undeclared connection is damage, which loading the chunk reports.
         lister.connections.get(number).is_none_or(Option::is_some)
     };
     let chunks = bag.chunks.iter().enumerate();
@@ -94,14 +94,14 @@ impl Chunks for Ros1Chunks {
     }
 }
 
-/// Puts messages into a chunk's list.
+/// Adds the selected messages of a chunk to its list.
 struct Lister {
-    /// Topic number of each connection; `None` for an unwanted topic.
+    /// Topic number of each connection; `None` if it is not selected.
     connections: BTreeMap<u32, Option<u32>>,
 }
 
 impl Lister {
-    /// Lists a record if it is a wanted message; `Err` if it makes no sense, in words.
+    /// Lists a record if it is a selected message. The error is the reason why the record is invalid.
     fn list(&self, record: &Inner<'_>, loaded: &mut Loaded) -> Result<(), String> {
         if record.header.op() != Some(op::MESSAGE) {
             return Ok(());

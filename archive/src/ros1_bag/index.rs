@@ -1,4 +1,4 @@
-//! The index at a bag's end: its connections, and what is in each chunk.
+//! The index at the end of a bag: its connections, and the contents of each chunk.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -14,10 +14,10 @@ const CHUNK_INFO_VERSION: u32 = 1;
 /// Resolution: bounds memory.
 const MAX_INDEX_BYTES: u64 = 256 << 20;
 
-/// Fills `bag` from its index, which should have as many connections and chunks as `counts` says.
+/// Fills `bag` from its index, which should have the numbers of connections and chunks in `counts`.
 ///
 /// # Errors
-/// The inner one, in words, if the index cannot be used; `bag` is then half filled.
+/// The inner error is the reason why the index cannot be used; `bag` is then partly filled.
 pub(super) fn read(
     bag: &mut Ros1Bag,
     records: &mut Records,

@@ -9,7 +9,7 @@ use crate::fields::Fields;
 /// Resolution: bounds memory; the longest field is the name of a topic.
 const MAX_HEADER_BYTES: u64 = 1 << 20;
 
-/// What a record is, as its field `op` says.
+/// Kinds of records, by the value of the field `op`.
 pub(super) mod op {
     pub(crate) const MESSAGE: u8 = 0x02;
     pub(crate) const BAG_HEADER: u8 = 0x03;
@@ -58,13 +58,13 @@ impl<'a> Header<'a> {
     }
 }
 
-/// A record within an unpacked chunk.
+/// A record in a decompressed chunk.
 pub(super) struct Inner<'a> {
     pub(super) header: Header<'a>,
     pub(super) data: &'a [u8],
 }
 
-/// The records in `records`; the last item is `None` if one is cut short.
+/// Iterates over the records in `records`. The last item is `None` if its record is truncated.
 pub(super) fn inner_records(records: &[u8]) -> impl Iterator<Item = Option<Inner<'_>>> {
     let mut fields = Fields(records);
     std::iter::from_fn(move || {
@@ -85,27 +85,27 @@ pub(super) fn inner_records(records: &[u8]) -> impl Iterator<Item = Option<Inner
     })
 }
 
-/// The front of a record in the file.
+/// Header of a record in the file, with the position of its data.
 #[derive(Default)]
 pub(super) struct Head {
-    /// Where the record begins.
+    /// File offset of the record.
     pub(super) at: u64,
     pub(super) header: Vec<u8>,
     pub(super) data_at: u64,
-    /// As the record says; what [`Step::Record`] says is in the file.
+    /// Declared length of the data; the file has all of them in a [`Step::Record`].
     pub(super) data_len: u64,
 }
 
-/// What comes next in the file.
+/// Result of a step to the next record.
 pub(super) enum Step {
     Record(Head),
     /// The file ends within this record.
     Torn {
         at: u64,
-        /// If that much of it is there.
+        /// Its header, if that is complete.
         head: Option<Head>,
     },
-    /// No record can begin so.
+    /// A malformed record.
     Nonsense {
         at: u64,
         reason: String,
@@ -113,10 +113,10 @@ pub(super) enum Step {
     End,
 }
 
-/// Goes through the records of a file.
+/// Cursor over the records of a file.
 pub(super) struct Records {
     file: BufReader<File>,
-    /// Where the next record begins.
+    /// File offset of the next record.
     next: u64,
     end: u64,
 }
@@ -135,14 +135,14 @@ impl Records {
         Ok(())
     }
 
-    /// The next `len` bytes, or as many as there are, in the place of what is in `into`.
+    /// Replaces the content of `into` by the next `len` bytes, or fewer at the end of the file.
     pub(super) fn read(&mut self, len: u64, into: &mut Vec<u8>) -> io::Result<()> {
         into.clear();
         self.next += (&mut self.file).take(len).read_to_end(into)? as u64;
         Ok(())
     }
 
-    /// The front of the next record; its data are skipped unless [`Records::data`] asks for them.
+    /// Reads the header of the next record. Its data are skipped unless [`Records::data`] reads them.
     pub(super) fn step(&mut self) -> io::Result<Step> {
         self.go_to_next()?;
         let at = self.next;
@@ -181,7 +181,7 @@ impl Records {
         Ok(Step::Record(head))
     }
 
-    /// The data of the record `head`, or as much of them as there is.
+    /// Reads the data of the record `head`, or fewer at the end of the file.
     pub(super) fn data(&mut self, head: &Head, into: &mut Vec<u8>) -> io::Result<()> {
         self.go_to(head.data_at)?;
         self.read(head.data_len, into)
@@ -189,7 +189,7 @@ impl Records {
 
     fn go_to_next(&mut self) -> io::Result<()> {
         let here = self.file.stream_position()?;
-        // Within the buffer if it can be: most records are short.
+        // Stays within the buffer if possible: most records are short.
         self.file
             .seek_relative((self.next.cast_signed()).wrapping_sub(here.cast_signed()))
     }

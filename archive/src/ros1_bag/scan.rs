@@ -1,4 +1,4 @@
-//! What is in a bag without a sound index: a walk through all of it, chunks unpacked.
+//! Contents of a bag without a sound index, from reading all of it and decompressing its chunks.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -8,7 +8,7 @@ use super::record::{Header, Records, Step, inner_records, op};
 use super::{Chunk, MAX_RECORD_BYTES, Ros1Bag};
 use crate::damage::DamageKind;
 
-/// Fills `bag` from all records from here on, up to where it is torn or makes no sense. Whether it does end so.
+/// Fills `bag` from all following records, up to a truncation or a malformed record. Returns whether there is one.
 pub(super) fn read(bag: &mut Ros1Bag, records: &mut Records) -> io::Result<bool> {
     let mut scan = Scan {
         bag,
@@ -28,7 +28,7 @@ pub(super) fn read(bag: &mut Ros1Bag, records: &mut Records) -> io::Result<bool>
                 let op = head.as_ref().and_then(|head| Header(&head.header).op());
                 match op {
                     Some(op::CHUNK) => scan.chunk(records, at, true)?,
-                    // Behind all messages: nothing is lost.
+                    // The record follows all messages: nothing is lost.
                     Some(op::CHUNK_INFO) => return Ok(false),
                     _ => {}
                 }
@@ -86,11 +86,11 @@ impl Scan<'_> {
     }
 }
 
-/// Takes in what lies in an unpacked chunk.
+/// Records the contents of a decompressed chunk.
 fn note_chunk(bag: &mut Ros1Bag, records: &[u8], at: u64, torn: bool) -> Result<(), String> {
     let mut counts: BTreeMap<u32, u64> = BTreeMap::new();
     let mut times: Option<(u64, u64)> = None;
-    // Told again by whoever reads the chunk: here only what can be had of it is counted.
+    // Reading the chunk reports malformed records; here only the valid ones are counted.
     for record in inner_records(records).flatten() {
         match record.header.op() {
             Some(op::CONNECTION) => bag.connect(record.header, record.data)?,

@@ -1,6 +1,6 @@
 use super::*;
 
-/// What is unfinished is the process's own, so one test at a time may write.
+/// Serialises the tests that write, because the set of unfinished files is global.
 static WRITING: Mutex<()> = Mutex::new(());
 
 #[test]

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use tauscope_archive::ros::{Bool, Header, JointState};
 use tauscope_archive::{Compression, McapWriter, Messages, Recording};
 
-/// Where the recordings begin \[ns since the epoch\].
+/// Start time of the recordings \[ns since the epoch\].
 pub const START_NS: i64 = 1_700_000_000_000_000_000;
 /// Time from one joint state to the next \[ns\].
 pub const PERIOD_NS: i64 = 10_000_000;
@@ -44,8 +44,8 @@ pub fn write(path: &Path, compression: Compression, count: i64) -> PathBuf {
     writer.finish().unwrap().path
 }
 
-/// Writes bodies as they are to `/joint_states`. `kind` is the name of the schema, its encoding and the encoding of the
-/// messages; without a name there is no schema.
+/// Writes bodies as they are to `/joint_states`. `kind` is the name of the schema, its encoding and the encoding of
+/// the messages; without a name there is no schema.
 pub fn mcap_of(path: &Path, kind: [&str; 3], bodies: &[Vec<u8>]) {
     let [name, schema, encoding] = kind;
     let mut writer = mcap::Writer::new(fs::File::create(path).unwrap()).unwrap();
@@ -105,7 +105,7 @@ pub fn drain(mut messages: Messages) -> (Vec<Copied>, usize) {
     (copies, damaged)
 }
 
-/// `../shared/<path>` beside the workspace, or `None` and a visible line.
+/// Returns `../shared/<path>` next to the workspace. Without that folder, prints a visible line and returns `None`.
 pub fn shared(test: &str, path: &str) -> Option<PathBuf> {
     let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
     if shared.is_dir() {

@@ -1,4 +1,4 @@
-//! Bare iceoryx2 with the payload of a stream: the floor of what our links cost.
+//! Bare iceoryx2 with the payload of a stream: the lower bound on the cost of a link.
 
 use std::time::{Duration, Instant};
 
@@ -36,7 +36,7 @@ pub struct BareSender {
 }
 
 impl BareSender {
-    /// Of the stream of that name, once somebody hears it. `waiting`: who hears it sleeps until it is woken.
+    /// Opens the stream and waits for its receiver. With `waiting`, the receiver sleeps until it is notified.
     pub fn open(place: &str, name: &str, waiting: bool) -> Self {
         let node = node(place);
         let service = name.try_into().expect("a name");
@@ -85,7 +85,7 @@ pub struct BareReceiver {
 }
 
 impl BareReceiver {
-    /// Of the stream of that name. `waiting`: it sleeps until an event says that a sample was sent.
+    /// Opens the stream. With `waiting`, the receiver sleeps until it is notified.
     pub fn open(place: &str, name: &str, waiting: bool) -> Self {
         let node = node(place);
         let service = name.try_into().expect("a name");
@@ -112,7 +112,7 @@ impl BareReceiver {
         }
     }
 
-    /// Hands the next sample to `read` where it lies.
+    /// Passes the next sample to `read` in place.
     pub fn receive<R>(&mut self, read: impl FnOnce(&TwinState) -> R) -> R {
         loop {
             if let Some(sample) = self.subscriber.receive().expect("received") {

@@ -1,4 +1,4 @@
-//! Asking the source of a cell to take a command.
+//! Client side of commands: sends a request to the source of a cell and waits for its answer.
 
 use std::time::{Duration, Instant};
 
@@ -7,42 +7,42 @@ use zenoh::bytes::Encoding;
 
 use super::{Answer, Request, Signed, key};
 
-/// Nobody answers yet: how long until the question is put again. A session that was just opened is not connected yet.
+/// Retry interval while there is no answer: a session that was just opened is not connected yet.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
 
-/// Why there is no answer.
+/// Failure to get an answer from a cell.
 #[derive(Debug, thiserror::Error)]
 pub enum AskError {
-    /// Nobody takes commands there.
+    /// No source accepts commands for the cell.
     #[error(
-        "nobody takes commands for the cell `{cell}`; does its pipeline run, and has its `ingest` a `commands`?"
+        "no source accepts commands for the cell `{cell}`; is its pipeline running, and does its `ingest` have `commands`?"
     )]
     Nobody {
-        /// The cell.
+        /// Name of the cell.
         cell: String,
     },
-    /// Zenoh does not take the question.
+    /// Query rejected by Zenoh.
     #[error("cannot ask the cell `{cell}`: {reason}")]
     Zenoh {
-        /// The cell.
+        /// Name of the cell.
         cell: String,
-        /// What Zenoh says.
+        /// Error message of Zenoh.
         reason: String,
     },
-    /// What came back is no answer.
+    /// Error reply, or a reply that is not an [`Answer`].
     #[error("the answer of the cell `{cell}` cannot be read: {reason}")]
     Unreadable {
-        /// The cell.
+        /// Name of the cell.
         cell: String,
-        /// What is wrong with it.
+        /// Cause.
         reason: String,
     },
 }
 
-/// Asks the source of `cell` to take a command, and waits for its answer for at most `patience`.
+/// Sends `request` to the source of `cell` and waits at most `patience` for the answer.
 ///
 /// # Errors
-/// If nobody answers, or not with an [`Answer`].
+/// If no source answers, or the reply is not an [`Answer`].
 pub fn ask(
     session: &zenoh::Session,
     cell: &str,
@@ -53,10 +53,10 @@ pub fn ask(
     ask_signed(session, cell, &Signed { request, by: None }, patience)
 }
 
-/// As [`ask`], with the name of who asks.
+/// Like [`ask`], with the name of the requester.
 ///
 /// # Errors
-/// As [`ask`].
+/// See [`ask`].
 pub fn ask_signed(
     session: &zenoh::Session,
     cell: &str,

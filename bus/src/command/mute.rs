@@ -1,20 +1,20 @@
-//! A mute as a lease: it holds from the stamp of its command on, and ends by itself.
+//! The mute as a lease: it starts at the stamp of its command and expires by itself.
 
 use super::LONGEST_MUTE_S;
 use crate::sample::{Command, Verb};
 
-/// The mute of a cell, in stamps.
+/// The mute of a cell, as an interval of stamps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MuteLease {
-    /// It holds from here on \[ns since the epoch\].
+    /// Start \[ns since the epoch\].
     from_ns: i64,
-    /// It is over then \[ns since the epoch\].
+    /// Expiry \[ns since the epoch\].
     until_ns: i64,
 }
 
 impl MuteLease {
-    /// The lease of `command`, which holds from `stamp_ns` on; `None` for any other command. One of 0 s is over at once,
-    /// and so takes an earlier one back.
+    /// The lease of a mute command, starting at `stamp_ns`; `None` for any other command. A lease of 0 s expires at
+    /// once and so revokes an earlier one.
     pub fn of(stamp_ns: i64, command: &Command) -> Option<Self> {
         let is_mute = command.verb() == Some(Verb::Mute);
         is_mute.then(|| Self {
@@ -24,7 +24,7 @@ impl MuteLease {
         })
     }
 
-    /// What is left of it at `now_ns` \[ns\]; 0 before it begins and after it has ended.
+    /// Remaining time at `now_ns` \[ns\]; 0 before the start and after the expiry.
     pub fn left_ns(&self, now_ns: i64) -> i64 {
         if self.from_ns <= now_ns {
             self.until_ns.saturating_sub(now_ns).max(0)
@@ -33,7 +33,7 @@ impl MuteLease {
         }
     }
 
-    /// Whether it holds at `now_ns`.
+    /// Whether the mute is in force at `now_ns`.
     pub fn holds(&self, now_ns: i64) -> bool {
         self.left_ns(now_ns) > 0
     }

@@ -6,14 +6,14 @@ use super::{LinkError, Sender, SenderCounts};
 use crate::sample::Sample;
 
 /// Sends every sample on all of its links: written in place on the first, copied to the others.
-/// Without a link samples are written and forgotten.
+/// Without links, samples are written and discarded.
 pub struct FanOut<T> {
     links: Vec<Box<dyn Sender<T>>>,
     sent: u64,
 }
 
 impl<T: Sample> FanOut<T> {
-    /// Over `links`.
+    /// A sender over all of `links`.
     pub fn new(links: Vec<Box<dyn Sender<T>>>) -> Self {
         Self { links, sent: 0 }
     }

@@ -1,4 +1,4 @@
-//! Links within one process: the reader sees the slot that the writer filled.
+//! Links within one process, without copies: the reader gets the slot that the writer filled.
 
 use std::any::Any;
 use std::collections::HashMap;
@@ -14,7 +14,7 @@ use super::{
 };
 use crate::sample::{Sample, SampleKind, flags};
 
-/// Streams between the threads of one process. Clones carry the same streams.
+/// Streams between the threads of one process. Clones share the streams.
 #[derive(Debug, Clone)]
 pub struct InProcess {
     streams: Arc<Mutex<HashMap<String, Stream>>>,
@@ -30,7 +30,7 @@ impl Default for InProcess {
     }
 }
 
-/// What all ends of a stream share; the channel is an `Arc<Channel<T>>` of the type `kind` names.
+/// State shared by all ends of a stream. `channel` is an `Arc<Channel<T>>` of the type that `kind` names.
 #[derive(Debug)]
 struct Stream {
     kind: SampleKind,
@@ -46,12 +46,12 @@ struct Channel<T> {
 type Readers<T> = Vec<Arc<Queue<Arc<T>>>>;
 
 impl InProcess {
-    /// Nothing carried yet.
+    /// A transport without streams.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The same with another patience than [`PATIENCE`].
+    /// Sets the stall timeout, by default [`PATIENCE`].
     #[must_use]
     pub fn with_patience(mut self, patience: Duration) -> Self {
         self.patience = patience;
@@ -136,7 +136,7 @@ struct InProcessSender<T> {
 }
 
 impl<T: Sample> InProcessSender<T> {
-    /// A slot that no reader holds, as a fresh default.
+    /// Returns a slot that no reader holds, reset to the default.
     fn loan(&mut self) -> Arc<T> {
         for _ in 0..self.slots.len() {
             self.cursor = (self.cursor + 1) % self.slots.len();
@@ -287,7 +287,7 @@ impl<T> Drop for InProcessReceiver<T> {
     }
 }
 
-// No code panics while it holds these locks, so a poisoned one still guards a whole state.
+// No code panics while it holds these locks, so a poisoned one still guards a consistent state.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,4 +1,4 @@
-//! A bounded queue between threads that keeps all or keeps the newest.
+//! A bounded queue between threads, with either overflow policy.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -9,19 +9,19 @@ use super::{Keep, Position};
 /// A sample on its way, or a reason why there is none.
 #[derive(Debug)]
 pub(crate) struct Message<P> {
-    /// Which life of the sender it is of.
+    /// Session epoch of the sender.
     pub(crate) instance: u64,
-    /// Its number in that life.
+    /// Sequence number within the session.
     pub(crate) sequence: u64,
     pub(crate) payload: P,
 }
 
-/// What became of an entry that was pushed.
+/// Result of [`Queue::push`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Pushed {
-    /// It is in the queue.
+    /// The entry is in the queue.
     Taken,
-    /// The reader took nothing within the patience; the entry is gone.
+    /// The reader took nothing within the stall timeout; the entry is discarded.
     GaveOut,
     /// The reader has closed the queue.
     Closed,
@@ -39,12 +39,12 @@ pub(crate) struct Queue<P> {
 #[derive(Debug)]
 struct State<P> {
     entries: VecDeque<Message<P>>,
-    /// Where this reader came in: the first entry that was offered, taken or not.
+    /// Position at which this reader connected: that of the first entry pushed, whether taken or discarded.
     begin: Option<Position>,
     closed: bool,
-    /// Patience has run out and the reader has taken nothing since.
+    /// The stall timeout has expired and the reader has taken nothing since.
     stuck: bool,
-    /// Readers and writers that sleep: nobody else is woken, for a wake-up is a system call even where nobody sleeps.
+    /// Sleeping readers and writers. Without a sleeper there is no notification, which would cost a system call.
     sleeping: Sleeping,
 }
 
@@ -75,7 +75,7 @@ impl<P> Queue<P> {
         self.keep
     }
 
-    /// Appends `entry`, waiting at most `patience` for room if all are kept.
+    /// Appends `entry`. Under [`Keep::All`], waits at most `patience` for room.
     pub(crate) fn push(&self, entry: Message<P>, patience: Duration) -> Pushed {
         let mut state = self.lock();
         state.begin.get_or_insert(Position {
@@ -153,12 +153,12 @@ impl<P> Queue<P> {
         }
     }
 
-    /// Where this reader came in, if anything has been offered to it.
+    /// Position at which this reader connected, if anything has been pushed.
     pub(crate) fn begin(&self) -> Option<Position> {
         self.lock().begin
     }
 
-    /// The reader leaves: nothing is taken any more and nobody waits for it.
+    /// Closes the queue when the reader disconnects: further entries are rejected, and a waiting writer returns.
     pub(crate) fn close(&self) {
         self.lock().closed = true;
         self.emptied.notify_all();
@@ -168,7 +168,7 @@ impl<P> Queue<P> {
         self.lock().closed
     }
 
-    // No code panics while it holds the lock, so a poisoned one still guards a whole state.
+    // No code panics while it holds the lock, so a poisoned one still guards a consistent state.
     fn lock(&self) -> MutexGuard<'_, State<P>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }

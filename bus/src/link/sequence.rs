@@ -1,21 +1,21 @@
-//! Holes in a stream, over the lives of its sender.
+//! Gaps in a stream, across restarts of its sender.
 
 use super::{Position, Received, ReceiverCounts};
 use crate::sample::{MOST_SAMPLES, Sample, Unsound, flags};
 
-/// Follows the sequence numbers that a receiver hears, and lets no sample through that a stage must not see.
+/// Tracks the sequence numbers that a receiver gets, and filters out invalid samples.
 ///
-/// The life before the present one is remembered as well: what a sender that died left behind may
-/// be read when its successor has already spoken.
+/// The sender's previous session is tracked as well: samples that a crashed sender left behind may be read after the
+/// first samples of its successor.
 #[derive(Debug, Default)]
 pub(crate) struct Tracker {
     stream: String,
     present: Option<Position>,
     former: Option<Position>,
     counts: ReceiverCounts,
-    /// An earlier life of this receiver has counted, too.
+    /// Resumed from an earlier incarnation of this receiver, which had counters of its own.
     resumed: bool,
-    /// The sender's present life has ended the stream.
+    /// The sender's current session has ended the stream.
     ended: bool,
 }
 
@@ -27,10 +27,10 @@ impl Tracker {
         }
     }
 
-    /// Takes note of a sample. Returns false if it is older than one already heard and so must not
-    /// be handed on: it has been counted as lost.
+    /// Records a sequence number. Returns false for a sample older than one already received: it counts as lost and
+    /// must not be passed on.
     fn note(&mut self, instance: u64, sequence: u64) -> bool {
-        // No number of a sound sample is as large.
+        // Sequence numbers of valid samples are smaller.
         let Some(next) = sequence.checked_add(1) else {
             return false;
         };
@@ -47,7 +47,7 @@ impl Tracker {
             return true;
         }
         if self.present.is_some() {
-            // A new life counts from 0, and this receiver was there: what it did not hear is lost.
+            // A new session counts from 0, and this receiver was connected: all samples before this one are lost.
             self.counts.lost = self.counts.lost.saturating_add(sequence);
         }
         self.former = self.present.replace(Position { instance, next });
@@ -55,8 +55,8 @@ impl Tracker {
         true
     }
 
-    /// The receiver's place in the stream when it came in, if this is the first it hears: what it
-    /// did not hear from there on is lost.
+    /// Sets the position at which the receiver connected, on its first message. Samples before it count as `before`,
+    /// missing samples after it as lost.
     fn came_in(&mut self, begin: Option<Position>) {
         if let (None, Some(begin)) = (self.present, begin) {
             self.counts.before = self.counts.before.saturating_add(begin.next);
@@ -64,8 +64,9 @@ impl Tracker {
         }
     }
 
-    /// Takes a message of the sender's life `instance` and hands its sample to `read`, unless it is the end of the
-    /// stream; `None` if it has been heard before or is refused. `begin` is where the receiver came in.
+    /// Processes a message of the sender's session `instance` and passes its sample to `read`, unless it is the end
+    /// of the stream. Returns `None` for a duplicate or a refused sample. `begin` is the position at which the
+    /// receiver connected.
     pub(crate) fn take<T: Sample>(
         &mut self,
         begin: Option<Position>,
@@ -96,7 +97,7 @@ impl Tracker {
         Some(Received::Sample)
     }
 
-    /// Counts a sample that no stage may see, and says so once.
+    /// Counts an invalid sample, with a warning for the first one.
     fn refuse(&mut self, why: &Unsound) {
         if self.counts.refused == 0 {
             let stream = &self.stream;
@@ -115,11 +116,11 @@ impl Tracker {
         self.present
     }
 
-    /// A life of the sender that is new to this receiver has had so many samples in all lives before it: of those, what
-    /// was not heard is lost, or, if nothing was heard yet, was sent before this receiver came in.
+    /// Processes the number of samples in all earlier sessions of the sender, which a new session announces. Those
+    /// not received are lost or, if nothing was received yet, were sent before this receiver connected.
     pub(crate) fn hears_of_former_lives(&mut self, samples: u64) {
         let samples = samples.min(MOST_SAMPLES);
-        // A life that follows another one of its run has heard of at least what is known here.
+        // A session restarted within the same run announces at least the samples received here.
         if let Some(position) = self.present
             && samples < position.next
             && !self.ended
@@ -127,8 +128,8 @@ impl Tracker {
             self.counts.broken_off += 1;
             let stream = &self.stream;
             tracing::warn!(
-                "stream `{stream}`: its sender was started anew before it had ended the stream: nobody knows what was on \
-                 its way"
+                "stream `{stream}`: its sender restarted without ending the stream; the number of samples in transit is \
+                 unknown"
             );
         }
         let counts = &mut self.counts;
@@ -137,7 +138,7 @@ impl Tracker {
         match self.present {
             None => counts.before = counts.before.saturating_add(missing),
             Some(_) if !self.resumed => counts.lost = counts.lost.saturating_add(missing),
-            // What the earlier life of this receiver has counted is not known here.
+            // The counters of the earlier incarnation of this receiver are unknown here.
             Some(_) => {}
         }
     }
@@ -223,7 +224,7 @@ mod tests {
             };
             tracker.take(Some(begin), instance, &sample, &mut |_| {})
         };
-        // Ten were sent before this receiver came in, and four died with their sender.
+        // Ten samples were sent before this receiver connected, and four were lost when their sender crashed.
         tracker.hears_of_former_lives(8);
         hear(&mut tracker, 1, 2);
         hear(&mut tracker, 1, 3);

@@ -1,20 +1,20 @@
-//! Links between the processes of one host: iceoryx2.
+//! Links between the processes of one host, over iceoryx2.
 //!
-//! A stream is, per [`Keep`] that somebody listens with (an iceoryx2 service either overflows or does
-//! not), a publish-subscribe service and two event services:
+//! For each [`Keep`] in use (an iceoryx2 service either overflows or does not), a stream has a publish-subscribe
+//! service and these event services:
 //!
-//! | service | kind | what for |
+//! | service | kind | purpose |
 //! | --- | --- | --- |
 //! | `<stream>/all` or `<stream>/newest` | publish-subscribe | samples, type name as in [`SampleKind::type_name`](crate::SampleKind::type_name), user header [`Joined`] |
-//! | the same | event | id 0: a sample was sent, or a sender is there: look |
-//! | the same and `/urgent`, of detections | event | id 0: a sample was sent that is urgent, or the end: look |
-//! | the same and `/back` | event | id 0: a receiver has taken the end of the stream; id 1 + (publisher id mod 255): a receiver hears this publisher |
+//! | same name | event | id 0: a sample was sent, or a sender has connected |
+//! | same name with `/urgent`, for detections | event | id 0: an urgent sample or the end of the stream was sent |
+//! | same name with `/back` | event | id 0: a receiver has taken the end of the stream; id 1 + (publisher id mod 255): a receiver is connected to this publisher |
 //!
-//! A receiver must say that it hears a sender, since iceoryx2 itself counts a subscriber that has not
-//! mapped the publisher's memory yet as connected, and drops what does not fit into its buffer.
+//! A receiver must acknowledge its connection to a sender. iceoryx2 itself treats a subscriber that has not mapped
+//! the publisher's memory yet as connected, and drops samples that do not fit into its buffer.
 //!
-//! All files of a run live under `/tmp/tauscope_<domain>` and as `/dev/shm/<domain>_*`; settings are
-//! in code alone, never in a configuration file that happens to lie about.
+//! All files of a run are under `/tmp/tauscope_<domain>` and `/dev/shm/<domain>_*`. Settings are in code only:
+//! configuration files of iceoryx2 on the host are ignored.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -49,35 +49,35 @@ pub use domain::{Domain, DomainError};
 pub use leftovers::{left_behind, remove_left_behind};
 
 const TRANSPORT: &str = "iceoryx2";
-/// What the service of events is called that come with alarms alone.
+/// Suffix of the event service for urgent samples.
 const URGENT: &str = "/urgent";
-/// Most receivers of a stream per [`Keep`].
+/// Largest number of receivers of a stream per [`Keep`].
 /// Resolution: shared memory.
 pub const MAX_RECEIVERS: usize = 16;
-/// One sender, and those of its former lives that nobody has cleaned up yet.
+/// Publishers of a service: one sender and its crashed predecessors that are not cleaned up yet.
 /// Resolution: shared memory.
 const MAX_SENDERS: usize = 4;
-/// A service's state is in flux while another process creates or removes it. iceoryx2 itself waits half a second, and
-/// then says that it does not exist: on a busy machine its maker may take longer.
-/// Resolution: how long a start may take.
+/// Timeout for opening a service that another process is creating or removing. iceoryx2 itself waits half a second
+/// and then reports that the service does not exist, but on a busy machine its creation may take longer.
+/// Resolution: start-up time.
 const OPEN_WITHIN: Duration = Duration::from_secs(10);
 
-/// Event of the back channel: the end was taken.
+/// Event of the back channel: a receiver has taken the end of the stream.
 const END_TAKEN: EventId = EventId::new(0);
-/// Most events of the back channel.
-/// Resolution: shared memory; publishers whose ids are equal modulo this share an event.
+/// Largest event id of the back channel.
+/// Resolution: shared memory; publishers whose ids are equal modulo this value share an event.
 const MAX_EVENT: usize = 255;
 
-/// What travels beside each sample.
+/// User header of each sample.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
 #[type_name("tauscope/Joined/1")]
 struct Joined {
-    /// The sequence number at which the newest of the receivers came in.
+    /// Sequence number at which the newest receiver connected.
     since: u64,
 }
 
-/// Event of the back channel: a receiver hears the publisher of that id.
+/// Event of the back channel: a receiver is connected to the publisher of that id.
 fn greeting(publisher: u128) -> EventId {
     EventId::new(1 + (publisher % MAX_EVENT as u128) as usize)
 }
@@ -91,7 +91,7 @@ pub struct SharedMemory {
     wake: Wake,
 }
 
-/// A node may move between threads but not be used by two at once.
+/// An iceoryx2 node, which may move between threads but not be used by two at once.
 #[derive(Debug, Clone)]
 struct SharedNode(Arc<Mutex<Node<Service>>>);
 
@@ -100,8 +100,8 @@ impl SharedNode {
         f(&self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Frees what processes that died without a farewell still hold: places in services, and the
-    /// unread samples that a sender would wait for.
+    /// Frees the resources of crashed processes: places in services, and the unread samples that a sender would wait
+    /// for.
     fn clean_dead(&self) -> CleanupState {
         self.with(Node::try_cleanup_dead_nodes)
     }
@@ -120,7 +120,7 @@ impl SharedMemory {
         let config = domain.config()?;
         let node = NodeBuilder::new()
             .config(&config)
-            // Signals belong to the program.
+            // The program has its own signal handlers.
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Service>()
             .map_err(|error| open_error(domain.as_str(), &error))?;
@@ -132,31 +132,31 @@ impl SharedMemory {
         })
     }
 
-    /// The same with another patience than [`PATIENCE`].
+    /// Sets the stall timeout, by default [`PATIENCE`].
     #[must_use]
     pub fn with_patience(mut self, patience: Duration) -> Self {
         self.patience = patience;
         self
     }
 
-    /// The same for streams with at most so many receivers per [`Keep`]; both ends of a stream must say the same.
-    /// Shared memory is laid out for all of them.
+    /// Sets the largest number of receivers per [`Keep`], by default [`MAX_RECEIVERS`]. Both ends of a stream must
+    /// use the same value. Shared memory is reserved for all of these receivers.
     #[must_use]
     pub fn with_receivers(mut self, receivers: usize) -> Self {
         self.receivers = receivers.clamp(1, MAX_RECEIVERS);
         self
     }
 
-    /// The same with receivers that learn in another way that a sample is there.
+    /// Sets the wake-up mode of receivers, by default [`Wake::Event`].
     #[must_use]
     pub fn with_wake(mut self, wake: Wake) -> Self {
         self.wake = wake;
         self
     }
 
-    /// Frees what dead processes of this domain still hold. A supervisor calls this once it has
-    /// waited for a dead child and before it starts the next one; senders that wait for the dead
-    /// one go on at once. Returns how many dead nodes were removed.
+    /// Frees the resources of crashed processes of this domain and returns the number of removed nodes. A supervisor
+    /// calls this after it has reaped a child and before it restarts it: senders blocked by the crashed process
+    /// continue at once.
     pub fn clean_dead_peers(&self) -> u64 {
         self.node.clean_dead().cleanups
     }
@@ -188,7 +188,7 @@ impl SharedMemory {
                             }
                             SystemInFlux
                             | Opening(
-                                // The last one is what a service that another process is making looks like at times.
+                                // `InternalFailure` also occurs while another process creates the service.
                                 E::IsMarkedForDestruction
                                 | E::HangsInCreation
                                 | E::DoesNotExist
@@ -219,7 +219,7 @@ impl SharedMemory {
                         match error {
                             SystemInFlux
                             | Opening(
-                                // The last one is what a service that another process is making looks like at times.
+                                // `InternalFailure` also occurs while another process creates the service.
                                 E::IsMarkedForDestruction
                                 | E::HangsInCreation
                                 | E::DoesNotExist
@@ -311,7 +311,7 @@ fn type_mismatch<T: Sample>(stream: &str, name: &ServiceName, config: &Config) -
 }
 
 enum Failure {
-    /// Worth another try.
+    /// Transient failure, worth a retry.
     Passing(LinkError),
     Final(LinkError),
 }
@@ -329,7 +329,7 @@ fn retry<R>(mut attempt: impl FnMut() -> Result<R, Failure>) -> Result<R, LinkEr
     }
 }
 
-/// Sleeps until a notification or the end of `timeout`, and hands on what came.
+/// Sleeps until a notification or the end of `timeout`, and passes the events to `heard`.
 fn wait(
     listener: &Listener<Service>,
     timeout: Duration,
@@ -338,11 +338,11 @@ fn wait(
     let result = if timeout.is_zero() {
         listener.try_wait(&mut heard)
     } else {
-        // iceoryx2 hands whole microseconds to the socket, which takes none of them for ever.
+        // iceoryx2 passes whole microseconds to the socket, for which 0 means no timeout.
         listener.timed_wait(&mut heard, timeout.max(Duration::from_micros(1)))
     };
     match result {
-        // A signal may come in between; whoever it was for has been told.
+        // A signal may interrupt the wait; its handler has already run.
         Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
         Err(error) => Err(error.to_string()),
     }

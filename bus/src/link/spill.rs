@@ -1,4 +1,4 @@
-//! A bounded queue before a sender whose receivers may be slow, so that the stage itself need not wait for them.
+//! A bounded queue in front of a sender with slow receivers, so that the stage itself need not wait for them.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -9,38 +9,39 @@ use serde::{Deserialize, Serialize};
 use super::{LinkError, Sender, SenderCounts};
 use crate::sample::Sample;
 
-/// Samples that are handed over at once.
-/// Resolution: how often the queue is locked, against memory.
+/// Samples per hand-over to the sending thread.
+/// Resolution: number of lock operations, against memory.
 const CHUNK: usize = 64;
-/// Empty chunks that are kept for later.
-/// Resolution: memory, against how often it is allocated.
+/// Empty chunks kept for reuse.
+/// Resolution: memory, against the number of allocations.
 const SPARE: usize = 8;
 
-/// What a [`Spill`] may take.
+/// Limits of a [`Spill`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpillSettings {
-    /// The most memory that waiting samples take \[bytes\].
+    /// Memory of the queue, at most \[bytes\].
     pub bytes: usize,
-    /// Samples that come within this time are sent together \[ms\].
+    /// Batching delay: samples emitted within this time are sent together \[ms\].
     pub linger_ms: u64,
-    /// When it is full: whether the stage waits, because its source can. Else what has no room is lost, and counted.
+    /// Whether the stage waits while the queue is full, because its source can be paused. Otherwise a sample without
+    /// room is discarded and counted.
     pub waits: bool,
 }
 
-/// A sender with a queue before it and a thread of its own, which begins with the first sample.
+/// A sender with a queue in front of it and a thread of its own, which starts with the first sample.
 ///
-/// What has no room leaves a hole in the sequence, which the receivers count as lost.
+/// A sample without room leaves a gap in the sequence, which the receivers count as lost.
 pub struct Spill<T> {
     shared: Arc<Shared<T>>,
-    /// Until the thread has it.
+    /// The wrapped sender, until the thread takes it.
     inner: Option<Box<dyn Sender<T>>>,
     settings: SpillSettings,
-    /// How many samples may wait.
+    /// Capacity of the queue \[samples\].
     most: usize,
-    /// How long it waits for room, if it waits.
+    /// Stall timeout for a full queue, if `settings.waits`.
     patience: Duration,
-    /// Patience has run out, and there was no room since.
+    /// The stall timeout has expired, and there was no room since.
     stuck: bool,
     receivers: u64,
     sent: u64,
@@ -54,22 +55,22 @@ struct Shared<T> {
 }
 
 struct State<T> {
-    /// Samples, each with how many were lost before it.
+    /// Samples, each with the number of samples lost right before it.
     chunks: VecDeque<Vec<(u64, T)>>,
     spare: Vec<Vec<(u64, T)>>,
-    /// Samples that are not sent yet.
+    /// Number of samples that are not sent yet.
     held: usize,
     /// Samples lost since the last one that found room.
     skipped: u64,
-    /// The thread waits to be woken.
+    /// The thread waits for a notification.
     idle: bool,
     /// The stream has ended.
     ended: bool,
-    /// Nobody sends any more.
+    /// The [`Spill`] was dropped.
     closed: bool,
     undelivered: u64,
     failure: Option<LinkError>,
-    /// The sender, once the end has been sent.
+    /// The wrapped sender, once it has sent the end.
     returned: Option<Box<dyn Sender<T>>>,
 }
 
@@ -91,7 +92,7 @@ impl<T> Default for State<T> {
 }
 
 impl<T: Sample> Spill<T> {
-    /// Before `inner`, which has so many `receivers` that keep all.
+    /// A queue in front of `inner`, which has this number of keep-all `receivers`.
     pub fn new(
         inner: Box<dyn Sender<T>>,
         settings: SpillSettings,
@@ -126,7 +127,7 @@ impl<T: Sample> Spill<T> {
         let started = thread.spawn(move || shared.pump(inner, linger));
         started.map(|_| ()).map_err(|error| LinkError::Send {
             stream: T::KIND.type_name().to_owned(),
-            reason: format!("no thread for what waits to be sent: {error}"),
+            reason: format!("cannot start the sending thread: {error}"),
         })
     }
 }
@@ -204,7 +205,7 @@ impl<T: Sample> Sender<T> for Spill<T> {
             return Err(error);
         }
         let Some(mut inner) = state.returned.take() else {
-            // They have not even got all of it.
+            // Part of the stream is not even sent yet.
             state.undelivered += state.held as u64 * self.receivers;
             return Ok(self.receivers.max(1) as usize);
         };
@@ -224,7 +225,7 @@ impl<T: Sample> Sender<T> for Spill<T> {
 }
 
 impl<T> Drop for Spill<T> {
-    /// What waits is still sent; a process that exits takes it along.
+    /// The thread still sends the queued samples, unless the process exits first.
     fn drop(&mut self) {
         self.shared.lock().closed = true;
         self.shared.filled.notify_one();
@@ -232,14 +233,14 @@ impl<T> Drop for Spill<T> {
 }
 
 impl<T> Shared<T> {
-    // No code panics while it holds the lock but a stage's own write, which leaves a whole sample behind.
+    // Only a stage's own `write` may panic while this lock is held, and it leaves a complete sample behind.
     fn lock(&self) -> MutexGuard<'_, State<T>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl<T: Sample> Shared<T> {
-    /// Sends what comes until the stream ends.
+    /// Sends the queued samples until the stream ends.
     fn pump(&self, mut inner: Box<dyn Sender<T>>, linger: Duration) {
         let result = self.send_all(&mut *inner, linger);
         let mut state = self.lock();
@@ -283,7 +284,7 @@ impl<T: Sample> Shared<T> {
         Ok(())
     }
 
-    /// The oldest chunk; none at the end.
+    /// Waits for the oldest chunk; `None` at the end.
     fn next(&self, linger: Duration) -> Option<Vec<(u64, T)>> {
         let mut state = self.lock();
         if state.chunks.is_empty() && !linger.is_zero() && !state.ended && !state.closed {

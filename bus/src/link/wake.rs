@@ -1,27 +1,27 @@
-//! How a receiver learns that a sample is there.
+//! Wake-up mode of a receiver.
 
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// How a receiver in shared memory learns that a sample is there.
+/// Wake-up mode of a receiver in shared memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Wake {
-    /// The sender wakes it. That costs the sender a system call for each sample and receiver.
+    /// Notification by the sender, at the cost of a system call for each sample and receiver.
     #[default]
     Event,
-    /// It looks at these intervals \[ms\]. The sender does not know of it, and many samples cost one look.
+    /// Polling at this interval \[ms\]. The sender has no extra cost, and one poll reads several samples.
     EveryMs(u64),
-    /// The same, but the sender of a stream that may hold an alarm wakes it for one
-    /// ([`Sample::is_urgent`](crate::Sample::is_urgent)).
+    /// Polling at this interval \[ms\], and a notification by the sender for an urgent sample
+    /// ([`Sample::is_urgent`](crate::Sample::is_urgent)) of a stream that may carry alarms.
     EveryMsOrUrgent(u64),
-    /// It looks all the time: the soonest, at the price of a core.
+    /// Busy polling: the lowest latency, at the cost of a core.
     Spin,
 }
 
 impl Wake {
-    /// How long a receiver sleeps between two looks, if it has to look.
+    /// Polling interval, if the mode polls.
     pub(crate) fn pause(self) -> Option<Duration> {
         match self {
             Self::Event => None,

@@ -1,8 +1,8 @@
-//! Where each number of a sample stands, for readers in other languages.
+//! Byte layout of the samples, for readers in other languages.
 //!
-//! A sample is the same in shared memory and in a Zenoh payload: C layout, little-endian, no padding
-//! anywhere. `f64` is IEEE 754; `[f64; 16]` has one entry per joint in URDF order, of which the first
-//! `joint_count` are meant; a name is 48 bytes of UTF-8, zero-padded. Offsets in bytes:
+//! The layout is the same in shared memory and in a Zenoh payload: C layout, little-endian, without padding. `f64` is
+//! IEEE 754; `[f64; 16]` has one entry per joint in URDF order, of which the first `joint_count` are valid; a name is
+//! 48 bytes of UTF-8, zero-padded. Offsets in bytes:
 //!
 //! | every sample | type | at |
 //! | --- | --- | --- |

@@ -1,47 +1,48 @@
-//! Links between hosts: Zenoh.
+//! Links between hosts, over Zenoh.
 //!
-//! # What travels
+//! # Protocol
 //!
-//! | key | what |
+//! | key | content |
 //! | --- | --- |
-//! | `<stream>`, that is `<cell>/<stage>` or `<cell>/<stage>/health` | samples for those who keep all |
-//! | `<stream>/@newest` | samples for those who keep the newest |
-//! | `<stream>/@all/<id>.<depth>`, `<stream>/@newest/<id>.<depth>` | a liveliness token of each receiver, with how many samples it has room for |
-//! | `<stream>/@from/<instance>` | a liveliness token of the sender |
-//! | `<stream>/@taken/<id>.<depth>` | how far a receiver has come |
+//! | `<stream>`, that is `<cell>/<stage>` or `<cell>/<stage>/health` | samples for keep-all receivers |
+//! | `<stream>/@newest` | samples for keep-newest receivers |
+//! | `<stream>/@all/<id>.<depth>`, `<stream>/@newest/<id>.<depth>` | liveliness token of each receiver, with its credit in samples |
+//! | `<stream>/@from/<instance>` | liveliness token of the sender |
+//! | `<stream>/@taken/<id>.<depth>` | acknowledgements of a receiver |
 //!
-//! (Chunks that begin with `@` are matched by no wildcard, so `<cell>/**` gives samples alone.)
+//! (No wildcard matches chunks that begin with `@`, so `<cell>/**` matches samples only.)
 //!
-//! Samples are put with
+//! A message of samples has
 //!
 //! - encoding `zenoh/bytes;tauscope/JointState/2`, the type name of the sample after the semicolon;
-//! - payload: one or more samples, one after the other, as they lie in memory, little-endian, without a frame: see
+//! - payload: one or more consecutive samples in their memory layout, little-endian, without framing: see
 //!   [`wire`](super::wire) for the offsets;
-//! - attachment: four little-endian `u64`: the sender's instance, another one after each restart, while
-//!   the sequence number in the sample's header counts from 0 again; the number of the oldest sample that can still be
-//!   had; how many numbers right before the first sample are lost for good; how many samples all earlier lives of the
-//!   sender had;
-//! - congestion control `drop`: nothing ever waits for a link that is full, so that a frozen or distant receiver holds
-//!   up neither other streams nor the stage.
+//! - attachment: four little-endian `u64`: the sender's session epoch; the sequence number of the oldest sample still
+//!   available; the number of samples lost for good right before the first one of this message; the number of samples
+//!   in all earlier sessions of the sender. Each restart of the sender begins a new session, in which the sequence
+//!   number in the sample's header counts from 0 again;
+//! - congestion control `drop`: no sender waits for a full link, so that a hung or distant receiver blocks neither
+//!   other streams nor the stage.
 //!
-//! A receiver says how far it has come with four little-endian `u64`: the instance that it hears, the number of the
-//! sample that it waits for, how many before that were lost for good, and 0, or 1 where samples are missing, or 2 where
-//! it leaves.
+//! An acknowledgement is four little-endian `u64`: the session epoch of the sender; the sequence number expected
+//! next; the number of samples before it that are lost for good; and 0 for progress, 1 if samples are missing, or 2
+//! if the receiver disconnects.
 //!
-//! # Nothing is lost
+//! # Retransmission
 //!
-//! The sender keeps every sample until all receivers that keep all have taken it, within a bound of memory (`log.rs`).
-//! What did not arrive goes out again, also after the network was cut, and to a receiver that was started again. If the
-//! memory is full, a source that reads a file waits; else the oldest sample gives way. Its number is then lost for
-//! good: both ends count it.
+//! The sender keeps every sample until all keep-all receivers have acknowledged it, within a memory bound (`log.rs`).
+//! It retransmits missing samples, also after a network failure, and to a restarted receiver. While the memory is
+//! full, a source that reads a file waits; otherwise the oldest sample is discarded. Its sequence number is then lost
+//! for good, and both ends count it.
 //!
-//! # Who is heard
+//! # Sender check
 //!
-//! Samples and ends of a stream count only from its sender: the one that shows a token, and no other while that one
-//! lives. The rest is refused, counted, and said once. This keeps out what strays; a network on which somebody may lie
-//! needs mutual TLS and access rules at its router (`deploy/zenoh`).
+//! Receivers accept samples and ends of a stream only from its sender: the session that has a liveliness token, and
+//! no other session while that one is alive. Other messages are refused, counted, and reported once. This keeps out
+//! stray publishers; a network with hostile participants needs mutual TLS and access rules at its router
+//! (`deploy/zenoh`).
 //!
-//! Nothing is discovered: sessions meet at the endpoints that they are given, and nowhere else.
+//! There is no discovery: sessions connect at the configured endpoints only.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -67,55 +68,56 @@ mod speaker;
 pub use endpoint::{EndpointError, check_endpoint};
 
 const TRANSPORT: &str = "zenoh";
-/// What a sender may take that nobody has told it.
+/// Default limits of a sender's retransmission window.
 /// Resolution: memory.
 const SPILL: SpillSettings = SpillSettings {
     bytes: 1 << 20,
     linger_ms: 0,
     waits: true,
 };
-/// Batches of 64 kB that may wait in a session for one peer.
-/// Resolution: memory; the most that Zenoh takes.
+/// Batches of 64 kB that a session queues for one peer.
+/// Resolution: memory; the largest value that Zenoh accepts.
 const QUEUE: usize = 16;
 
-/// Sessions that one that listens takes. Zenoh's own limit of 1000 turns the next away without a word.
-/// Resolution: as many cells as a fleet host follows.
+/// Sessions that a listener accepts. Beyond its default limit of 1000, Zenoh rejects sessions without a message.
+/// Resolution: the number of cells that a fleet host follows.
 const MOST_SESSIONS: usize = 10_000;
 
-/// Where Zenoh sessions of this host meet others, e.g. `tcp/10.0.0.1:7447`.
+/// Endpoints of the Zenoh sessions of this host, e.g. `tcp/10.0.0.1:7447`.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ZenohEndpoints {
-    /// Where it listens.
+    /// Endpoints to listen on.
     #[serde(default)]
     pub listen: Vec<String>,
-    /// Where it connects to; it tries until it succeeds, and again when a connection breaks.
+    /// Endpoints to connect to; retried until the connection succeeds, and again after it breaks.
     #[serde(default)]
     pub connect: Vec<String>,
 }
 
 impl ZenohEndpoints {
-    /// A session of its own there, for other traffic than streams; what it connects to need not be there yet. Its mode is
-    /// `router`: a router passes on what peers say, as sessions of ROS 2 are, to routers and clients, but not to other
-    /// peers, and a client cannot begin before its router is there.
+    /// Opens a separate session at these endpoints, for traffic other than streams; its peers may start later. Its
+    /// mode is `router`: a router forwards the data of peers, such as ROS 2 sessions, to routers and clients but not
+    /// to other peers, and a client cannot start before its router.
     ///
     /// # Errors
-    /// As [`Zenoh::open`].
+    /// See [`Zenoh::open`].
     pub fn session(&self) -> Result<zenoh::Session, LinkError> {
         open_session("router", self, PATIENCE)
     }
 
-    /// The same for what routers and clients alone are to hear, such as a fleet host. Its mode is `peer`: routers tell one
-    /// another who is linked to whom, each time that one comes or goes, and a thousand of them would do little else.
+    /// Opens a separate session whose data only routers and clients receive, such as a fleet host. Its mode is
+    /// `peer`: routers announce each change of their links to all other routers, which would overload a network of
+    /// a thousand.
     ///
     /// # Errors
-    /// As [`Zenoh::open`].
+    /// See [`Zenoh::open`].
     pub fn session_for_routers(&self) -> Result<zenoh::Session, LinkError> {
         open_session("peer", self, PATIENCE)
     }
 
-    /// Where another session on this host meets one that has these: where it listens, and what it connects to. For a
-    /// listener on all interfaces that is the loopback.
+    /// Endpoints at which another session on this host reaches a session with these endpoints: its listeners, and the
+    /// endpoints that it connects to. A listener on all interfaces is reached at the loopback address.
     pub fn reached_at(&self) -> impl Iterator<Item = String> + '_ {
         let listens = self.listen.iter().map(|endpoint| {
             endpoint
@@ -132,17 +134,17 @@ pub struct Zenoh {
     session: zenoh::Session,
     patience: Duration,
     spill: SpillSettings,
-    /// How many samples the earlier lives of a sender had.
+    /// Number of samples in all earlier sessions of a sender.
     former: u64,
-    /// Ends of this session so far, so that each has a number.
+    /// Number of link ends opened so far, from which each end gets its id.
     ends: Arc<AtomicU64>,
 }
 
 impl Zenoh {
-    /// Opens a session; what it connects to need not be there yet.
+    /// Opens a session; its peers may start later.
     ///
     /// # Errors
-    /// [`LinkError::Open`] if an endpoint is none, or cannot be listened at.
+    /// [`LinkError::Session`] if an endpoint is invalid, or cannot be listened on.
     pub fn open(endpoints: &ZenohEndpoints, patience: Duration) -> Result<Self, LinkError> {
         Ok(Self {
             session: open_session("peer", endpoints, patience)?,
@@ -153,21 +155,22 @@ impl Zenoh {
         })
     }
 
-    /// The same with other bounds for what waits to be taken.
+    /// Sets the limits of a sender's retransmission window.
     #[must_use]
     pub fn with_spill(mut self, spill: SpillSettings) -> Self {
         self.spill = spill;
         self
     }
 
-    /// The same for a sender whose earlier lives had so many samples: its receivers then know what died with those.
+    /// Sets the number of samples in all earlier sessions of a sender, from which its receivers derive the samples
+    /// lost in a crash.
     #[must_use]
     pub fn with_former(mut self, samples: u64) -> Self {
         self.former = samples;
         self
     }
 
-    /// A number for an end, unlike any other session's: their random ids differ.
+    /// Returns an id for a link end. It differs between sessions, because their ids are random.
     fn unique(&self) -> u64 {
         let id = self.session.zid().to_le_bytes();
         let mut low = [0; 8];
@@ -207,18 +210,18 @@ impl Transport for Zenoh {
     }
 }
 
-/// Where the sessions of a host's processes meet those of other hosts. Only one process can listen
-/// at an endpoint: the supervisor keeps this, and each stage's process connects to it.
+/// The session through which the processes of a host reach other hosts. Only one process can listen on an endpoint:
+/// the supervisor keeps this session, and the process of each stage connects to it.
 #[derive(Debug)]
 pub struct ZenohRouter {
     _session: zenoh::Session,
 }
 
 impl ZenohRouter {
-    /// Listens and connects at `endpoints`, and passes on what comes until it is dropped.
+    /// Listens on and connects to `endpoints`, and forwards data until it is dropped.
     ///
     /// # Errors
-    /// As [`Zenoh::open`].
+    /// See [`Zenoh::open`].
     pub fn open(endpoints: &ZenohEndpoints) -> Result<Self, LinkError> {
         Ok(Self {
             _session: open_session("router", endpoints, PATIENCE)?,
@@ -226,12 +229,12 @@ impl ZenohRouter {
     }
 }
 
-/// What Zenoh says of an error, without the places in its source code.
+/// Message of a Zenoh error, without its source code locations.
 pub fn zenoh_reason(error: &zenoh::Error) -> String {
     without_places(&error.to_string())
 }
 
-/// `a b` of `a at /src/c.rs:12. b`.
+/// Removes source code locations: `a at /src/c.rs:12. b` becomes `a b`.
 fn without_places(text: &str) -> String {
     let mut kept: Vec<&str> = Vec::new();
     for word in text.split(' ') {
@@ -257,14 +260,14 @@ fn open_session(
     Ok(session)
 }
 
-/// The settings of a session, and more, which go before those.
+/// Settings of a session; `more` overrides them.
 fn config(
     mode: &str,
     endpoints: &ZenohEndpoints,
     patience: Duration,
     more: &[(&str, String)],
 ) -> zenoh::Result<zenoh::Config> {
-    // A receiver gives out before the link is closed over it.
+    // Longer than the stall timeout: a stalled receiver is given up before Zenoh closes the link because of it.
     let close_after_us = (patience * 2).as_micros().to_string();
     let quoted = |text: &str| format!("{text:?}");
     let settings = [
@@ -321,7 +324,7 @@ fn encoding(kind: SampleKind) -> Encoding {
     Encoding::ZENOH_BYTES.with_schema(kind.type_name())
 }
 
-/// Where the samples are put for receivers of that kind.
+/// Key on which the samples for receivers with this policy are published.
 fn data_key(stream: &str, keep: Keep) -> String {
     match keep {
         Keep::All => stream.to_owned(),
@@ -333,7 +336,7 @@ fn last_chunk<'a>(key: &'a zenoh::key_expr::KeyExpr<'_>) -> &'a str {
     key.as_str().rsplit('/').next().unwrap_or_default()
 }
 
-/// The sender that a token is of.
+/// Session epoch in the key of a sender's token.
 fn instance_of(key: &zenoh::key_expr::KeyExpr<'_>) -> Option<u64> {
     u64::from_str_radix(last_chunk(key), 16).ok()
 }

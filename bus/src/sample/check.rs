@@ -1,29 +1,28 @@
-//! What a sample from another process must be before a stage may see it: any bit pattern is a sample, not every one
-//! makes sense.
+//! Validation of samples from other processes: every bit pattern is a sample, but not every one is valid.
 
 use super::{Command, Detection, Header, Health, JointState, MAX_JOINTS, TwinState, flags};
 
 /// Latest stamp \[ns\].
 /// Physical: the stamp of a ROS 2 message counts its seconds in 31 bits.
 const LATEST_NS: i64 = i32::MAX as i64 * 1_000_000_000 + 999_999_999;
-/// No stream has as many samples; above it, counting could overflow.
+/// Largest valid sequence number; beyond it, counters could overflow.
 /// Resolution: 285 000 years at 1 kHz.
 pub(crate) const MOST_SAMPLES: u64 = 1 << 53;
 
-/// Why a sample is refused.
+/// Reason for the refusal of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Unsound {
-    /// More joints than a sample has room for.
+    /// Joint count beyond the capacity of a sample.
     #[error("{0} joints, at most {MAX_JOINTS} are possible")]
     Joints(u32),
-    /// A time that no clock shows.
-    #[error("a stamp of {0} ns, which no clock shows")]
+    /// Time stamp out of range \[ns\].
+    #[error("an impossible stamp of {0} ns")]
     Stamp(i64),
-    /// A sequence number that no stream reaches.
-    #[error("sequence number {0}, which no stream reaches")]
+    /// Sequence number out of range.
+    #[error("the impossible sequence number {0}")]
     Sequence(u64),
-    /// A value that must be a number is none.
-    #[error("a value of `{0}` that is no finite number")]
+    /// Non-finite value in the named field.
+    #[error("a value of `{0}` that is not finite")]
     NotFinite(&'static str),
 }
 
@@ -40,7 +39,7 @@ impl Header {
     }
 }
 
-/// A time that can be told from another without overflow.
+/// Checks that the difference between two such times cannot overflow.
 fn is_time(stamp_ns: i64) -> Result<(), Unsound> {
     if stamp_ns.unsigned_abs() > LATEST_NS.unsigned_abs() {
         return Err(Unsound::Stamp(stamp_ns));
@@ -49,7 +48,7 @@ fn is_time(stamp_ns: i64) -> Result<(), Unsound> {
 }
 
 fn finite(name: &'static str, values: &[f64]) -> Result<(), Unsound> {
-    // To the end also behind one that is not finite: without a branch for each, the processor takes several at once.
+    // No early exit: without a branch per value, the loop is vectorised.
     if values
         .iter()
         .fold(true, |all, value| all & value.is_finite())
@@ -66,7 +65,7 @@ macro_rules! finite {
     };
 }
 
-/// What of a sample must hold besides its header.
+/// Validation of the values after the header.
 pub(super) trait Values {
     fn check_values(&self) -> Result<(), Unsound>;
 }
@@ -91,7 +90,7 @@ impl Values for TwinState {
 }
 
 impl Values for Detection {
-    /// Score and threshold are for people: an infinite one harms nobody.
+    /// Score and threshold may be infinite: they are only displayed.
     fn check_values(&self) -> Result<(), Unsound> {
         is_time(self.contact_ns)?;
         if self.header.has(flags::FORCE) {
@@ -131,7 +130,7 @@ mod tests {
         assert_eq!(empty.check(), Err(Unsound::NotFinite("effort")));
         assert_eq!(
             empty.check().unwrap_err().to_string(),
-            "a value of `effort` that is no finite number"
+            "a value of `effort` that is not finite"
         );
     }
 

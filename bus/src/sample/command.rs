@@ -1,4 +1,4 @@
-//! What somebody told the pipeline, as it travels with a joint state.
+//! Commands to the pipeline, as part of a joint state.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
@@ -7,7 +7,7 @@ use super::Name;
 
 macro_rules! verbs {
     ($($(#[$doc:meta])* $verb:ident = $number:literal, $name:ident;)+) => {
-        /// What a [`Command`] tells to do.
+        /// Verb of a [`Command`].
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         #[repr(u32)]
         pub enum Verb {
@@ -15,10 +15,10 @@ macro_rules! verbs {
         }
 
         impl Verb {
-            /// All there are.
+            /// All verbs.
             pub const ALL: &[Self] = &[$(Self::$verb),+];
 
-            /// In a word, as in a [`Request`](crate::command::Request).
+            /// Name of the verb, as in a [`Request`](crate::command::Request).
             pub fn as_str(self) -> &'static str {
                 match self {
                     $(Self::$verb => stringify!($name),)+
@@ -28,19 +28,19 @@ macro_rules! verbs {
     };
 }
 verbs! {
-    /// Somebody has seen the alarm.
+    /// Acknowledges the alarm.
     Acknowledge = 1, acknowledge;
-    /// Alarms raise no stop for so long.
+    /// Mutes alarms for a limited time, during which they raise no stop.
     Mute = 2, mute;
-    /// Another tool is attached.
+    /// Sets the attached tool.
     Payload = 3, payload;
-    /// Detectors learn anew.
+    /// Restarts the learning of detectors.
     Learn = 4, learn;
-    /// A note in the archive.
+    /// Writes a note to the archive.
     Label = 5, label;
 }
 
-/// A command as it travels, in the joint state from which it holds. All zeros: none.
+/// A command, in the joint state from which on it is in force. All zeros for none.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable, ZeroCopySend)]
 pub struct Command {
@@ -48,28 +48,28 @@ pub struct Command {
     pub verb: u32,
     /// Zero.
     pub reserved: u32,
-    /// Seconds of a mute \[s\], mass of a payload \[kg\].
+    /// Duration of a mute \[s\], or mass of a payload \[kg\].
     pub value: f64,
     /// Centre of mass of a payload in the tool link's frame \[m\].
     pub com_m: [f64; 3],
-    /// Text of a label; of another command who asked for it, empty where that is not known.
+    /// Text of a label; for other commands the requester, empty where unknown.
     pub text: Name,
 }
 
 impl Command {
-    /// What it tells to do; `None` for no command, or one of a later version.
+    /// The verb; `None` for no command, or a verb of a later version.
     pub fn verb(&self) -> Option<Verb> {
         let mut all = Verb::ALL.iter().copied();
         all.find(|verb| *verb as u32 == self.verb)
     }
 
-    /// Who asked for it, where that is known; nobody for a label, whose text is its own.
+    /// The requester, where known; `None` for a label, whose text is the note.
     pub fn by(&self) -> Option<&str> {
         let by = self.text.as_str();
         (self.verb()? != Verb::Label && !by.is_empty()).then_some(by)
     }
 
-    /// For people; `None` for no command.
+    /// Description for people; `None` for no command.
     pub fn in_words(&self) -> Option<String> {
         let what = self.what_in_words()?;
         Some(match self.by() {
@@ -101,7 +101,7 @@ impl Command {
         }
     }
 
-    /// The numbers and texts that go with the verb, by name: what an archive holds. Numbers read back are the same.
+    /// Arguments of the verb by name, as archived. Numbers are restored exactly.
     pub fn arguments(&self) -> Vec<(&'static str, String)> {
         let mut arguments = self.own_arguments();
         arguments.extend(self.by().map(|by| ("by", by.to_owned())));

@@ -11,11 +11,11 @@ pub struct Name {
 }
 
 impl Name {
-    /// Longest text in bytes.
+    /// Longest text \[bytes\].
     /// Resolution: size of a sample; longer names are cut.
     pub const CAPACITY: usize = 48;
 
-    /// `text`, cut at the last character that fits.
+    /// Creates a name from `text`, cut after the last character that fits.
     pub fn new(text: &str) -> Self {
         let mut end = text.len().min(Self::CAPACITY);
         while !text.is_char_boundary(end) {
@@ -26,7 +26,7 @@ impl Name {
         Self { bytes }
     }
 
-    /// The text; bytes from a foreign writer that are not UTF-8 end it.
+    /// The text, up to the first byte that is not valid UTF-8.
     pub fn as_str(&self) -> &str {
         let end = self
             .bytes

@@ -1,4 +1,4 @@
-//! The links of a seat, opened.
+//! Opens the links of a seat.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -10,11 +10,11 @@ use crate::link::{
 };
 use crate::sample::{Detection, Health, JointState, Sample, SampleKind, SampleRef, TwinState};
 
-/// A sender with a queue before it waits so long for a receiver that lives and takes nothing.
+/// Stall timeout of a sender behind a queue, for a receiver that is alive and takes nothing.
 /// Tuned: by hand, on no recorded seeds; not swept. Longer than any queue lasts.
 const SPILLED_PATIENCE: Duration = Duration::from_mins(10);
 
-/// The transports of a process, opened where one is first needed. Clones are one.
+/// The transports of a process, opened on first use. Clones share them.
 #[derive(Debug, Clone, Default)]
 pub struct Transports(Arc<Mutex<Open>>);
 
@@ -35,8 +35,8 @@ pub struct Links {
 }
 
 impl Links {
-    /// For a seat in the process that has these transports. All seats of a process are in one domain and meet the
-    /// other hosts at the same place.
+    /// Links of a seat in the process with these transports. All seats of a process share one domain and the same
+    /// endpoints.
     pub fn of(seat: &Seat, transports: &Transports) -> Self {
         Self {
             transports: transports.clone(),
@@ -47,10 +47,10 @@ impl Links {
         }
     }
 
-    /// Opens the sending end of `output` on all its ways.
+    /// Opens the sending end of `output` over all its links.
     ///
     /// # Errors
-    /// As [`Transport::sender`](crate::Transport::sender).
+    /// See [`Transport::sender`](crate::Transport::sender).
     pub fn sender<T: Sample>(&self, output: &Output) -> Result<Box<dyn Sender<T>>, LinkError> {
         check::<T>(&output.stream, output.kind)?;
         let mut ways = Vec::new();
@@ -109,7 +109,7 @@ impl Links {
     /// Opens the receiving end of `input`.
     ///
     /// # Errors
-    /// As [`Transport::receiver`](crate::Transport::receiver).
+    /// See [`Transport::receiver`](crate::Transport::receiver).
     pub fn receiver<T: Sample>(&self, input: &Input) -> Result<Box<dyn Receiver<T>>, LinkError> {
         check::<T>(&input.stream, input.kind)?;
         let (stream, keep, depth) = (&input.stream, input.keep, input.depth);
@@ -127,10 +127,10 @@ impl Links {
         Ok(receiver)
     }
 
-    /// The same where the type is known at run time only.
+    /// Opens the receiving end of an `input` whose sample type is known at run time only.
     ///
     /// # Errors
-    /// As [`Links::receiver`].
+    /// See [`Links::receiver`].
     pub fn any_receiver(&self, input: &Input) -> Result<Box<dyn AnyReceiver>, LinkError> {
         Ok(match input.kind {
             SampleKind::JointState => Box::new(self.receiver::<JointState>(input)?),
@@ -165,7 +165,7 @@ impl Links {
 }
 
 impl Transports {
-    // Nothing panics between two states of it.
+    // No code panics while it holds the lock.
     fn lock(&self) -> MutexGuard<'_, Open> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -173,20 +173,20 @@ impl Transports {
 
 /// A receiving end whose sample type is known at run time only.
 pub trait AnyReceiver: Send {
-    /// As [`Receiver::receive`].
+    /// See [`Receiver::receive`].
     ///
     /// # Errors
-    /// As [`Receiver::receive`].
+    /// See [`Receiver::receive`].
     fn receive(
         &mut self,
         timeout: Duration,
         read: &mut dyn FnMut(SampleRef<'_>),
     ) -> Result<Received, LinkError>;
 
-    /// As [`Receiver::counts`].
+    /// See [`Receiver::counts`].
     fn counts(&self) -> ReceiverCounts;
 
-    /// As [`Receiver::position`].
+    /// See [`Receiver::position`].
     fn position(&self) -> Option<Position>;
 }
 

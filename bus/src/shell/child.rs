@@ -1,18 +1,18 @@
-//! A stage in a process of its own, such as one that is not ours.
+//! A stage in a process of its own, such as a stage from another crate.
 //!
-//! Whoever starts the process (a supervisor) talks to it in lines of JSON:
+//! The supervisor that starts the process communicates with it in lines of JSON:
 //!
-//! | where | what |
+//! | channel | content |
 //! | --- | --- |
 //! | standard input, first line | the [`Seat`] |
-//! | standard input, from then on | the line `stop`, or its end, tells the stage to stop: it deals with what has arrived, completes its output and leaves. `SIGTERM` does the same; `SIGINT` is left to the supervisor, since a terminal sends it to both |
-//! | standard output | one [`Line`] each: `{"event":"ready","missing":0}` once its receivers are connected (or the wait for them is over), `{"event":"report",...}` ten times a second, `{"event":"stuck",...}` instead while it does not go on, `{"event":"note","text":"..."}` where it found something, `{"event":"done",...}` at the end |
-//! | standard error | anything, for people |
+//! | standard input, later lines | the line `stop`, or the end of the input, requests a stop: the stage processes the samples that have arrived, completes its output and exits. `SIGTERM` does the same; `SIGINT` is left to the supervisor, since a terminal sends it to both |
+//! | standard output | one [`Line`] each: `{"event":"ready","missing":0}` once its receivers are connected (or the wait for them is over); `{"event":"report",...}` ten times a second; `{"event":"stuck",...}` instead while it is hung; `{"event":"note","text":"..."}` for a finding; `{"event":"done",...}` at the end |
+//! | standard error | free text, for people |
 //! | exit code | 0 ended or stopped, 1 failed |
 //!
-//! The order of a start needs no referee. A process opens its senders, waits until the receivers it
-//! expects are connected, and only then opens its own receivers: so readiness travels from the sinks
-//! up to the sources, and nothing is sent before all hear it.
+//! The start-up order needs no coordinator. A process opens its senders, waits until the expected receivers are
+//! connected, and only then opens its own receivers. Readiness thus propagates from the sinks to the sources, and
+//! nothing is sent before all receivers are connected.
 
 use std::error::Error;
 use std::io::{self, BufRead as _, Write as _};
@@ -31,79 +31,79 @@ use crate::sample::{Health, Sample};
 use crate::seat::{Links, Seat, Transports};
 use crate::stage::Stage;
 
-/// How often a running stage reports: what a killed stage did since then is not known.
+/// Reporting interval of a running stage; the work of a killed stage since its last report is unknown.
 /// Resolution: the cost of reporting.
 pub(super) const REPORT_EVERY: Duration = Duration::from_millis(100);
 
-/// What a stage's process says on standard output.
+/// A line of a stage's process on standard output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Line {
-    /// It begins.
+    /// Start of the stage.
     Ready {
-        /// The stage, where the process has several.
+        /// Name of the stage, if the process has several.
         #[serde(default)]
         stage: String,
-        /// How many of the receivers it expects are not there.
+        /// Number of expected receivers that are not connected.
         missing: usize,
     },
-    /// It runs.
+    /// Periodic report.
     Report(Report),
-    /// It found something that people want to know.
+    /// Finding of the stage, for people.
     Note {
-        /// The stage, where the process has several.
+        /// Name of the stage, if the process has several.
         #[serde(default)]
         stage: String,
-        /// What.
+        /// Text of the finding.
         text: String,
     },
-    /// What holds there from now on, in a word or two.
+    /// Lasting condition of the stage from now on.
     Holds {
-        /// The stage.
+        /// Name of the stage.
         stage: String,
-        /// What; empty for nothing of note.
+        /// Condition in a word or two; empty for none.
         text: String,
     },
-    /// It, and all that run in its thread, do not go on: for so long it has not finished what it does with a sample.
-    /// While that lasts there are no reports.
+    /// Hung stage: it has not finished processing a sample, and blocks all stages in its thread. There are no reports
+    /// meanwhile.
     Stuck {
-        /// The stage.
+        /// Name of the stage.
         stage: String,
-        /// For how long \[ms\].
+        /// Duration so far \[ms\].
         for_ms: u64,
     },
-    /// It leaves.
+    /// Final report.
     Done(Report),
 }
 
-/// Why a process cannot take its seat.
+/// Failure of a process to start its stage.
 #[derive(Debug, thiserror::Error)]
 pub enum ChildError {
-    /// Standard input gave no line.
+    /// Missing line on standard input.
     #[error("no seat on standard input: {0}")]
     NoSeat(#[source] io::Error),
-    /// The line is no seat.
+    /// First line that is not a seat.
     #[error("the first line on standard input is no seat: {0}")]
     NotASeat(#[source] serde_json::Error),
-    /// Signals cannot be listened to.
+    /// Signal handlers that cannot be installed.
     #[error("cannot listen to signals: {0}")]
     Signals(#[source] io::Error),
-    /// The seat has no place for this kind of stage.
+    /// Seat with the wrong inputs or output for this kind of stage.
     #[error("the seat of `{stage}` has {found}, expected {expected}")]
     Shape {
-        /// The stage.
+        /// Name of the stage.
         stage: String,
-        /// What this kind of stage needs.
+        /// Inputs and output that this kind of stage needs.
         expected: &'static str,
-        /// What the seat has.
+        /// Inputs and output of the seat.
         found: String,
     },
-    /// A link cannot be opened.
+    /// Link that cannot be opened.
     #[error(transparent)]
     Link(#[from] LinkError),
 }
 
-/// The process of a stage, seated.
+/// The process of a stage, with its seat.
 #[derive(Debug)]
 pub struct Child {
     seat: Seat,
@@ -111,11 +111,10 @@ pub struct Child {
 }
 
 impl Child {
-    /// Takes the seat that stands on standard input, and listens from now on to what tells it to
-    /// stop.
+    /// Reads the seat from standard input, and handles stop requests from then on.
     ///
     /// # Errors
-    /// If there is none, or signals cannot be listened to.
+    /// If there is no seat, or signal handlers cannot be installed.
     pub fn take_seat() -> Result<Self, ChildError> {
         let mut line = String::new();
         let length = io::stdin().read_line(&mut line);
@@ -138,12 +137,12 @@ impl Child {
         Ok(Self { seat, context })
     }
 
-    /// Its seat.
+    /// The seat.
     pub fn seat(&self) -> &Seat {
         &self.seat
     }
 
-    /// Runs `stage` here to its end.
+    /// Runs `stage` to its end.
     pub fn stage<I: Sample, O: Sample>(self, stage: &mut dyn Stage<I, O>) -> ExitCode {
         let Self { seat, context } = &self;
         let report = reporting(&context.board, || {
@@ -173,7 +172,7 @@ impl Child {
         }
     }
 
-    /// Says that the stage could not be made from its seat.
+    /// Reports that the stage could not be created from its seat.
     pub fn fail(self, error: &dyn Error) -> ExitCode {
         done(Report {
             stage: self.seat.stage,
@@ -202,8 +201,8 @@ fn done(report: Report) -> ExitCode {
     ExitCode::from(u8::from(failed))
 }
 
-/// The `main` of a stage from another crate: takes the seat on standard input, makes the stage for
-/// it, and runs it to its end.
+/// The `main` of a stage from another crate: reads the seat from standard input, creates the stage for it, and runs
+/// the stage to its end.
 ///
 /// ```no_run
 /// # use tauscope_bus::{Detection, Emit, Seat, Stage, StageError, TwinState, shell};
@@ -231,7 +230,7 @@ where
     let child = match Child::take_seat() {
         Ok(child) => child,
         Err(error) => {
-            // Without a seat nobody reads lines from here.
+            // Without a seat there is no supervisor that reads standard output.
             let _ = writeln!(io::stderr(), "{error}");
             return ExitCode::FAILURE;
         }
@@ -242,7 +241,7 @@ where
     }
 }
 
-/// Where the health of this seat's stage goes.
+/// Opens the stream of health reports of the seat's stage.
 pub(super) fn health_sender(
     links: &Links,
     seat: &Seat,
@@ -253,7 +252,7 @@ pub(super) fn health_sender(
     }
 }
 
-/// Runs `body` while another thread says now and then what is on the board.
+/// Runs `body` while another thread writes the reports on the status board at a fixed interval.
 pub(super) fn reporting<R>(board: &Board, body: impl FnOnce() -> R) -> R {
     std::thread::scope(|scope| {
         let (finished, until_finished) = mpsc::channel::<()>();
@@ -269,9 +268,9 @@ pub(super) fn reporting<R>(board: &Board, body: impl FnOnce() -> R) -> R {
     })
 }
 
-/// Says what is on the board, unless it has all been said for the last time.
+/// Writes the reports on the status board, except final ones.
 pub(super) fn say_posted(board: &Board) {
-    // Locked before it is read, so that no older report comes after a newer one.
+    // Locked before the board is read, so that no older report follows a newer one.
     let mut out = io::stdout().lock();
     let mut text = Vec::new();
     if let Some((stage, silent_for)) = board.stuck(Instant::now()) {
@@ -283,11 +282,11 @@ pub(super) fn say_posted(board: &Board) {
             write_line(&mut text, &Line::Report(report));
         }
     }
-    // At once: what is killed meanwhile has said what all have done, or nothing.
+    // One write for all stages: a process that is killed meanwhile has reported all of them or none.
     let _ = out.write_all(&text).and_then(|()| out.flush());
 }
 
-/// Says that a stage begins.
+/// Reports the start of a stage.
 pub(super) fn say_ready(stage: &str, missing: usize) {
     say(&Line::Ready {
         stage: stage.to_owned(),
@@ -295,7 +294,7 @@ pub(super) fn say_ready(stage: &str, missing: usize) {
     });
 }
 
-/// Tells people what a stage that runs in this process has found.
+/// Reports a finding of a stage of this process.
 pub fn note(stage: &str, text: &str) {
     say(&Line::Note {
         stage: stage.to_owned(),
@@ -303,7 +302,7 @@ pub fn note(stage: &str, text: &str) {
     });
 }
 
-/// Tells people what holds at a stage of this process from now on; nothing of note if `text` is empty.
+/// Reports a lasting condition of a stage of this process; an empty `text` ends it.
 pub fn holds(stage: &str, text: &str) {
     say(&Line::Holds {
         stage: stage.to_owned(),
@@ -311,7 +310,7 @@ pub fn holds(stage: &str, text: &str) {
     });
 }
 
-/// If the supervisor reads no more, the end of standard input says so: a line may be lost then.
+/// Writes a line. A write error is ignored: a supervisor that no longer reads also closes standard input.
 pub(super) fn say(line: &Line) {
     let mut out = io::stdout().lock();
     write_line(&mut out, line);
@@ -324,7 +323,8 @@ fn write_line(out: &mut impl io::Write, line: &Line) {
     }
 }
 
-/// Reads standard input to its end. The thread is not joined: it ends with the process.
+/// Requests a stop on the line `stop` or at the end of standard input. The thread is not joined: it ends with the
+/// process.
 fn stop_with_the_supervisor(stop: Stop) {
     std::thread::spawn(move || {
         for line in io::stdin().lock().lines() {
@@ -353,7 +353,7 @@ pub(super) fn stop_on_signals(stop: impl Fn() + Send + 'static) -> io::Result<()
         if runtime.block_on(terminate.recv()).is_some() {
             stop();
         }
-        // `_interrupt` is caught and left alone for as long as the process lives.
+        // `_interrupt` is kept for the life of the process: the signal is caught and ignored.
     });
     Ok(())
 }

@@ -1,17 +1,17 @@
-//! A process that runs trees of stages, each in a thread of its own.
+//! A worker process that runs stage groups ([`Tree`]s), each in a thread of its own.
 //!
-//! Whoever starts the process (a supervisor) talks to it in lines:
+//! The supervisor that starts the process communicates with it in lines:
 //!
-//! | where | what |
+//! | channel | content |
 //! | --- | --- |
-//! | standard input, `[...]` | a list of [`Seat`]s: a tree that begins, its first stage first, each stage after the one it hears; or one sink |
-//! | standard input, `stop NAME` | the tree with the stage of that name ends: it deals with what has arrived and completes its streams |
-//! | standard input, `stop`, or `SIGTERM` | every tree ends |
-//! | standard input, its end | every tree ends, and then the process |
+//! | standard input, `[...]` | a list of [`Seat`]s that starts a stage group, each stage after the one whose stream it receives; or the seat of one sink |
+//! | standard input, `stop NAME` | stops the group with the stage of that name: it processes the samples that have arrived and completes its streams |
+//! | standard input, `stop`, or `SIGTERM` | stops every group |
+//! | standard input, its end | stops every group, and then the process |
 //! | standard output | one [`Line`] each, as of a [`child`](super::child); each names its stage |
 //!
-//! A tree in which a stage fails or panics ends with it, each of its stages says so, and the other trees go on. The
-//! supervisor may send its seats again.
+//! When a stage fails or panics, its whole group ends, each stage of the group reports that, and the other groups
+//! continue. The supervisor may restart the group by sending its seats again.
 
 use std::error::Error;
 use std::io::{self, BufRead as _};
@@ -30,7 +30,7 @@ use crate::sample::{Detection, JointState, Sample, TwinState};
 use crate::seat::{Input, Links, Output, Seat, TransportKind, Transports};
 use crate::stage::{Sink, Source, Stage};
 
-/// A stage of ours, made.
+/// A stage of this program, created from its seat.
 pub enum Member {
     /// A source.
     Source(Box<dyn Source<JointState>>),
@@ -42,7 +42,7 @@ pub enum Member {
     Sink(Box<dyn Sink>),
 }
 
-/// A stage could not be made or seated.
+/// Failure to create or to start a stage.
 #[derive(Debug)]
 pub struct Unmade {
     stage: String,
@@ -50,7 +50,7 @@ pub struct Unmade {
 }
 
 impl Unmade {
-    /// That one, for this reason.
+    /// Failure of `stage`, with its cause.
     pub fn new(stage: &str, why: &dyn Error) -> Self {
         Self {
             stage: stage.to_owned(),
@@ -59,10 +59,10 @@ impl Unmade {
     }
 }
 
-/// Makes the stages of one tree out of their seats.
+/// Creates the stages of one group from their seats.
 type Make = dyn Fn(&[Seat]) -> Result<Vec<Member>, Unmade> + Send + Sync;
 
-/// The trees that run.
+/// The running groups.
 type Running = Arc<Mutex<Vec<Alive>>>;
 
 struct Alive {
@@ -71,7 +71,8 @@ struct Alive {
     board: Board,
 }
 
-/// The process's work, to its end: runs the trees that standard input names, out of what `make` makes of their seats.
+/// Runs a worker process to its end: starts the groups that standard input assigns to it, with the stages that `make`
+/// creates from their seats.
 pub fn crew<M>(make: M) -> ExitCode
 where
     M: Fn(&[Seat]) -> Result<Vec<Member>, Unmade> + Send + Sync + 'static,
@@ -116,7 +117,7 @@ where
                     match std::thread::Builder::new().name(name).spawn(live) {
                         Ok(thread) => threads.push(thread),
                         Err(error) => {
-                            eprintln!("error: no thread for a tree of stages: {error}");
+                            eprintln!("error: cannot start a thread for a stage group: {error}");
                             return ExitCode::FAILURE;
                         }
                     }
@@ -139,7 +140,7 @@ where
     }
     stop_all();
     for thread in threads {
-        // Its panics end in `live`.
+        // `live` catches the panics of its group.
         let _ = thread.join();
     }
     code
@@ -157,7 +158,7 @@ fn report_now_and_then(running: &Running, until_it_ends: &mpsc::Receiver<()>) {
     }
 }
 
-/// A tree from its beginning to its end.
+/// Runs a group from its start to its end.
 fn live(
     seats: &[Seat],
     context: &Context,
@@ -179,7 +180,7 @@ fn live(
         )),
     };
     let reports = failed.unwrap_or_else(|(stage, why)| {
-        // As far as it came; before it began there is nothing on the board.
+        // The last reports; before the group has started, the board is empty.
         let mut reports = context.board.read();
         if reports.is_empty() {
             let new = |seat: &Seat| Report {
@@ -259,10 +260,10 @@ fn shape(seat: &Seat, expected: &'static str) -> ChildError {
     }
 }
 
-/// Branches whose stage before them is not grown yet, by its name.
+/// Branches whose preceding stage is not built yet, by the name of that stage.
 type Branches<T> = Vec<(String, Box<dyn Branch<T>>)>;
 
-/// Grows a tree from its tips to its first stage.
+/// Builds a group from its last stages back to its first one.
 struct Grower<'a> {
     transports: &'a Transports,
     turn: Turn,
@@ -339,7 +340,7 @@ impl<'a> Grower<'a> {
     }
 }
 
-/// The sending end of a stream that is heard outside its tree.
+/// Opens the sending end of a stream, if it has receivers outside its group.
 fn link<T: Sample>(
     links: &Links,
     output: &Output,
@@ -350,7 +351,7 @@ fn link<T: Sample>(
     links.sender(output).map(Some)
 }
 
-/// A branch waits for the stage before it, or, heard from elsewhere, begins a tree.
+/// Keeps a branch for its preceding stage or, if its input comes over a link, starts a group with it.
 fn attach<I: Sample>(
     turn: &Turn,
     loose: &mut Branches<I>,

@@ -1,24 +1,24 @@
-//! Health reports by the stream's own clock.
+//! Health reports, scheduled by stream time.
 
 use super::report::Report;
 use crate::link::{LinkError, Sender};
 use crate::sample::{Header, Health, Name};
 
 /// Stream time between two reports.
-/// Resolution: size of the archive, against how soon a loss is seen.
+/// Resolution: size of the archive, against the detection delay of a loss.
 const SECOND_NS: i64 = 1_000_000_000;
 
-/// Says when a stage owes a [`Health`] sample, and fills it.
+/// Schedules the [`Health`] samples of a stage, and fills them.
 pub struct HealthClock {
     stage: Name,
     restarts: u64,
-    /// The second of stream time that the last report stood in.
+    /// Second of stream time of the newest sample.
     second: Option<i64>,
     newest: Header,
 }
 
 impl HealthClock {
-    /// For the stage of that name, which has been started again `restarts` times.
+    /// Clock of the stage of that name, which was restarted `restarts` times.
     pub fn new(stage: &str, restarts: u64) -> Self {
         Self {
             stage: Name::new(stage),
@@ -28,8 +28,8 @@ impl HealthClock {
         }
     }
 
-    /// Takes note of a sample; true if a report is due. One is due at the first sample of each
-    /// second, also when the clock jumps back.
+    /// Processes the header of a sample, and returns whether a report is due: at the first sample of each second,
+    /// also when the clock jumps back.
     pub fn note(&mut self, header: &Header) -> bool {
         self.newest = *header;
         let second = header.stamp_ns.div_euclid(SECOND_NS);
@@ -37,7 +37,7 @@ impl HealthClock {
         before.is_some_and(|before| before != second)
     }
 
-    /// Writes what `report` says.
+    /// Fills a sample from `report`.
     pub fn fill(&self, report: &Report, health: &mut Health) {
         health.header.stamp_ns = self.newest.stamp_ns;
         health.header.received_ns = self.newest.received_ns;
@@ -56,13 +56,13 @@ pub(super) struct HealthSender<S> {
 }
 
 impl<S: Sender<Health>> HealthSender<S> {
-    /// For the stage of that name, which has been started again `restarts` times.
+    /// Sender of the stage of that name, which was restarted `restarts` times.
     pub fn new(out: S, stage: &str, restarts: u64) -> Self {
         let clock = HealthClock::new(stage, restarts);
         Self { clock, out }
     }
 
-    /// As [`HealthClock::note`].
+    /// See [`HealthClock::note`].
     pub fn note(&mut self, header: &Header) -> bool {
         self.clock.note(header)
     }
@@ -74,7 +74,7 @@ impl<S: Sender<Health>> HealthSender<S> {
     /// Sends a report.
     ///
     /// # Errors
-    /// What the link says.
+    /// If the link fails.
     pub fn send(&mut self, report: &Report) -> Result<(), LinkError> {
         let clock = &self.clock;
         self.out.send_with(&mut |health| clock.fill(report, health))
@@ -83,7 +83,7 @@ impl<S: Sender<Health>> HealthSender<S> {
     /// Sends the last report, and the end of the stream.
     ///
     /// # Errors
-    /// What the link says.
+    /// If the link fails.
     pub fn end(&mut self, report: &Report) -> Result<(), LinkError> {
         self.send(report)?;
         self.out.end()

@@ -1,8 +1,8 @@
-//! What a stage has done so far, where its death does not reach it.
+//! Counters of a stage that survive its crash.
 //!
-//! A report is up to a tenth of a second old when a stage is killed. So each stage also keeps its counts in a file that
-//! its supervisor has made and that lies in memory: the kernel keeps what was written there, whatever kills the writer.
-//! A sample is noted before it is sent, so that a link has never brought more than was noted.
+//! A report is up to a tenth of a second old when a stage is killed. Each stage therefore also keeps its counters in
+//! a memory-mapped file that its supervisor has created. The kernel keeps the written values when the writer is
+//! killed. A sample is counted before it is sent, so that a link never delivers more samples than were counted.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -16,51 +16,52 @@ use crate::link::{Position, ReceiverCounts};
 use crate::sample::Header;
 use crate::seat::Seat;
 
-/// Numbers of the stage itself: emitted, stamp of the newest sample.
+/// Number of words of the stage itself: emitted, stamp of the newest sample.
 const OWN: usize = 2;
-/// Numbers of an input: received, lost, refused, before, foreign, whether it was heard, instance, next, broken off.
+/// Number of words per input: received, lost, refused, before, foreign, whether a position follows, instance, next,
+/// broken off.
 const EACH: usize = 9;
-/// Place of the last of these.
+/// Index of the last of these words.
 const BROKEN_OFF: usize = 8;
 
-/// Where a stage keeps its counts; nowhere by default. Clones are one.
+/// Counters of a stage in a memory-mapped file; without a file by default. Clones share it.
 #[derive(Debug, Clone, Default)]
 pub struct Ledger(Option<Arc<MmapRaw>>);
 
 impl Ledger {
-    /// Length of the file for a stage with so many inputs \[bytes\].
+    /// Length of the file for a stage with this number of inputs \[bytes\].
     pub fn length(inputs: usize) -> usize {
         (OWN + EACH * inputs) * size_of::<u64>()
     }
 
-    /// Where the seat says. Without it a supervisor knows less, and the stage does its work.
+    /// Opens the file that the seat names. On a failure the stage works without it.
     pub fn of(seat: &Seat) -> Self {
         let Some(path) = &seat.ledger else {
             return Self::default();
         };
         Self::open(path).unwrap_or_else(|error| {
             let stage = &seat.stage;
-            tracing::warn!(stage, %error, "the counts of this stage do not outlive it");
+            tracing::warn!(stage, %error, "the counters of this stage are lost if it crashes");
             Self::default()
         })
     }
 
-    /// In a file of that length.
+    /// Maps a file of the length that [`Ledger::length`] returns.
     ///
     /// # Errors
-    /// If it cannot be opened.
+    /// If the file cannot be opened or mapped.
     pub fn open(path: &Path) -> io::Result<Self> {
         let file: File = OpenOptions::new().read(true).write(true).open(path)?;
         Ok(Self(Some(Arc::new(MmapRaw::map_raw(&file)?))))
     }
 
-    /// So many samples have been emitted, with the one of this header, which is about to be sent.
+    /// Records the number of emitted samples, including the one with the header `newest`, which is about to be sent.
     pub(super) fn emitted(&self, count: u64, newest: &Header) {
         self.put(1, newest.stamp_ns.cast_unsigned());
         self.put(0, count);
     }
 
-    /// So much has come in from an input.
+    /// Records the counters and the position of an input.
     pub(super) fn heard(&self, input: usize, counts: &ReceiverCounts, position: Option<Position>) {
         let at = OWN + EACH * input;
         let ReceiverCounts {
@@ -83,7 +84,8 @@ impl Ledger {
         }
     }
 
-    /// So many samples have come in from an input with the one of this header, which is about to be dealt with.
+    /// Records the number of samples received from an input, including the one with this header, which is about to be
+    /// processed.
     pub(super) fn takes(&self, input: usize, received: u64, header: &Header) {
         let at = OWN + EACH * input;
         self.put(at, received);
@@ -100,26 +102,27 @@ impl Ledger {
         if (place + 1) * size_of::<u64>() > map.len() {
             return;
         }
-        // SAFETY: the place is within the mapping, which lives as long as `map`; a mapping begins at a page, so that
-        // the number is aligned; this process reaches the memory through atomics only, and others map or read it apart.
+        // SAFETY: the place is within the mapping, which lives as long as `map`. A mapping begins at a page, so that
+        // the word is aligned. This process accesses the memory through atomics only; others map or read it
+        // separately.
         let word = unsafe { AtomicU64::from_ptr(map.as_mut_ptr().cast::<u64>().add(place)) };
         word.store(number, Ordering::Release);
     }
 }
 
-/// What stood in a [`Ledger`] when its stage died.
+/// Contents of a [`Ledger`] after the crash of its stage.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Account {
-    /// Samples that went out.
+    /// Samples emitted.
     pub emitted: u64,
-    /// Stamp of the newest of them \[ns since the epoch\].
+    /// Stamp of the newest emitted sample \[ns since the epoch\].
     pub stamp_ns: i64,
-    /// Each input: what came, and how far it was.
+    /// Counters and position of each input.
     pub inputs: Vec<(ReceiverCounts, Option<Position>)>,
 }
 
 impl Account {
-    /// Out of the bytes of a ledger.
+    /// Decodes the bytes of a ledger.
     pub fn read(bytes: &[u8]) -> Self {
         let (words, _) = bytes.as_chunks::<8>();
         let words: Vec<u64> = words.iter().map(|word| u64::from_ne_bytes(*word)).collect();
@@ -183,7 +186,7 @@ mod tests {
         ledger.emitted(42, &header);
         ledger.heard(1, &counts, Some(position));
         ledger.takes(1, 8, &header);
-        // Beyond its end nothing is written.
+        // A write beyond the end of the file is ignored.
         ledger.heard(2, &counts, Some(position));
         let account = Account::read(&std::fs::read(&path).unwrap());
         std::fs::remove_file(&path).unwrap();

@@ -1,9 +1,9 @@
-//! Whose turn it is among the stages of one thread, for other threads to see.
+//! Heartbeat of a thread: the stage that it currently runs, visible to other threads.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Whose turn it is, as other threads see it. Clones are one.
+/// Heartbeat of a thread that runs stages. Clones share it.
 #[derive(Debug, Clone, Default)]
 pub struct Pulse(Arc<Beat>);
 
@@ -15,17 +15,17 @@ struct Beat {
 }
 
 impl Pulse {
-    /// The stage that runs.
+    /// Name of the current stage.
     pub fn whose(&self) -> String {
         self.name(self.0.at.load(Ordering::Relaxed))
     }
 
-    /// Whether it waits for a link, which has a patience of its own.
+    /// Whether the thread waits for a link, which has a stall timeout of its own.
     pub fn waits(&self) -> bool {
         self.0.waits.load(Ordering::Relaxed)
     }
 
-    /// Hands something to a link.
+    /// Runs `send`, marked as waiting for a link.
     pub fn waiting<R>(&self, send: impl FnOnce() -> R) -> R {
         self.0.waits.store(true, Ordering::Relaxed);
         let sent = send();
@@ -35,19 +35,19 @@ impl Pulse {
 
     /// The name of the stage at `place`.
     pub fn name(&self, place: usize) -> String {
-        // A list that is only added to is whole at any time.
+        // The list is append-only, hence consistent at any time.
         let names = self.0.names.lock().unwrap_or_else(PoisonError::into_inner);
         names.get(place).cloned().unwrap_or_default()
     }
 
-    /// A number for the stage of that name.
+    /// Registers a stage, and returns its index.
     pub fn place(&self, name: &str) -> usize {
         let mut names = self.0.names.lock().unwrap_or_else(PoisonError::into_inner);
         names.push(name.to_owned());
         names.len() - 1
     }
 
-    /// The stage at `place` does its work; where it panics, it stays its turn. One thread calls this.
+    /// Runs the work of the stage at `place`, which stays the current stage after a panic. Called by one thread only.
     pub fn turn_of<R>(&self, place: usize, work: impl FnOnce() -> R) -> R {
         let before = self.0.at.load(Ordering::Relaxed);
         self.0.at.store(place, Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! How a stage fares.
+//! Reports of stages, and the status board on which they are posted.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,42 +11,42 @@ use crate::shell::pulse::Pulse;
 use crate::stage::StageError;
 use crate::trouble::Trouble;
 
-/// What is said of the stage that failed, to those that end with it.
+/// End of the failure text of a stage that ends because another stage of its group has failed.
 const OF_ANOTHER: &str = ", which runs with it, failed";
 
-/// What a stage has done so far.
+/// Report of a stage.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Report {
-    /// The stage.
+    /// Name of the stage.
     pub stage: String,
-    /// Samples that came in; for a source, those it has read.
+    /// Samples received; for a source, samples read.
     pub received: u64,
-    /// Samples that went out.
+    /// Samples emitted.
     pub emitted: u64,
-    /// Holes in the inputs, and what had to be refused there.
+    /// Samples lost or refused at the inputs.
     pub lost: u64,
-    /// Samples the stage itself had to drop.
+    /// Samples dropped by the stage itself.
     pub refused: u64,
     /// Samples that expected keep-all receivers did not get.
     pub undelivered: u64,
-    /// Receivers that had not read to the end of the stream when the stage left.
+    /// Number of receivers that had not read to the end of the stream when the stage exited.
     pub untaken: usize,
     /// Stamp of the newest sample \[ns since the epoch\].
     pub stamp_ns: i64,
-    /// How far a source of known length is, from 0 to 1.
+    /// Progress of a source of known length, from 0 to 1.
     pub fraction_done: Option<f64>,
-    /// Why a source gives nothing that can be used, while it does not.
+    /// Reason why a source gives no usable data, while that lasts.
     #[serde(default)]
     pub trouble: Option<Trouble>,
-    /// The files that a sink completed last.
+    /// Files that a sink completed last.
     #[serde(default)]
     pub files: Vec<PathBuf>,
-    /// How many files a sink has completed.
+    /// Number of files that a sink has completed.
     #[serde(default)]
     pub files_completed: u64,
-    /// Each input.
+    /// Reports of the inputs.
     pub inputs: Vec<InputReport>,
-    /// How it ended; `None` while it runs.
+    /// Outcome of the stage; `None` while it runs.
     pub outcome: Option<Outcome>,
 }
 
@@ -56,7 +56,7 @@ impl Report {
         self.lost + self.refused
     }
 
-    /// Whether all that it should have dealt with and passed on was.
+    /// Whether all samples were processed and delivered.
     pub fn is_complete(&self) -> bool {
         self.dropped() == 0 && self.undelivered == 0 && self.untaken == 0
     }
@@ -74,37 +74,36 @@ impl Report {
     }
 }
 
-/// One input of a stage.
+/// Report of one input of a stage.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct InputReport {
-    /// The stage it comes from.
+    /// Name of the stage that emits the stream.
     pub from: String,
-    /// What came and what did not.
+    /// Counters of the receiving end.
     #[serde(flatten)]
     pub counts: ReceiverCounts,
-    /// How far it has come; goes into the seat of the stage's next life.
+    /// Position in the stream, for the seat of a restarted stage.
     pub position: Option<Position>,
     /// Whether the stream has ended.
     pub ended: bool,
 }
 
-/// How a stage ended.
+/// Outcome of a stage.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// Its inputs, or the source itself, have ended.
+    /// End of its inputs, or of the source itself.
     Ended,
-    /// It was told to stop.
+    /// Stop on request.
     Stopped,
-    /// It could not go on; the text says why.
+    /// Failure, with its cause.
     Failed(String),
-    /// Its input is not what it was configured for, and another life would end the same; the text says
-    /// why.
+    /// Input that does not match the configuration, with the reason; a restart would fail again.
     Unfit(String),
 }
 
 impl Outcome {
-    /// Of a stage that could not go on.
+    /// Outcome of a stage that failed with this error.
     pub(super) fn of(error: &StageError) -> Self {
         let why = text_of(error);
         match error {
@@ -113,17 +112,17 @@ impl Outcome {
         }
     }
 
-    /// Of a stage that ended because `other`, of the same tree, failed.
+    /// Outcome of a stage that ended because `other`, of the same group, failed.
     pub(super) fn with(other: &str) -> Self {
         Self::Failed(format!("stage `{other}`{OF_ANOTHER}"))
     }
 
-    /// Whether it could not go on because another stage of its tree failed, which says why.
+    /// Whether the stage ended because another stage of its group failed, whose report has the cause.
     pub fn is_of_another(&self) -> bool {
         self.failure().is_some_and(|why| why.ends_with(OF_ANOTHER))
     }
 
-    /// Why it could not go on, if it could not.
+    /// Cause of a failure; `None` for other outcomes.
     pub fn failure(&self) -> Option<&str> {
         match self {
             Self::Failed(why) | Self::Unfit(why) => Some(why),
@@ -132,7 +131,7 @@ impl Outcome {
     }
 }
 
-/// Where stages that run together post their reports, all of one instant. Clones are one.
+/// Status board for the reports of a stage group, all of one instant. Clones share it.
 #[derive(Debug, Clone, Default)]
 pub struct Board(Arc<Mutex<Posted>>);
 
@@ -145,16 +144,16 @@ struct Posted {
 }
 
 impl Board {
-    /// A loop that has posted nothing for so long, and does not wait for a link, is stuck in one of its stages.
+    /// Time without a report after which a run loop that does not wait for a link is treated as hung.
     /// Resolution: ten reports are missing; a busy machine delays a few.
     const STUCK_AFTER: Duration = Duration::from_secs(1);
 
-    /// The newest reports; none until the loop has begun.
+    /// The newest reports; empty before the run loop has started.
     pub fn read(&self) -> Vec<Report> {
         self.lock().reports.clone()
     }
 
-    /// The stage that the loop is stuck in, and for how long; none while the loop goes round.
+    /// The hung stage and the time since the last report; `None` while the run loop works.
     pub fn stuck(&self, now: Instant) -> Option<(String, Duration)> {
         let posted = self.lock();
         let silent_for = now.saturating_duration_since(posted.at?);
@@ -163,7 +162,7 @@ impl Board {
         if silent_for < Self::STUCK_AFTER || waits || over || posted.ends {
             return None;
         }
-        // Without a tree there is one stage.
+        // Without a heartbeat there is one stage.
         let stage = match &posted.pulse {
             Some(pulse) => pulse.whose(),
             None => posted.reports.first()?.stage.clone(),
@@ -171,12 +170,12 @@ impl Board {
         Some((stage, silent_for))
     }
 
-    /// Whose turn it is tells this.
+    /// Sets the heartbeat that names the current stage.
     pub(super) fn follow(&self, pulse: Pulse) {
         self.lock().pulse = Some(pulse);
     }
 
-    /// What the stages do at their end may take long, and whoever waits for that has a patience of his own.
+    /// Disables the hang detection: the end of a stage may take long, and those who wait for it have a timeout.
     pub(super) fn ends(&self) {
         self.lock().ends = true;
     }
@@ -192,7 +191,7 @@ impl Board {
     }
 }
 
-/// Posts now and then, not for every sample.
+/// Posts reports at a fixed interval instead of for every sample.
 #[derive(Debug)]
 pub(super) struct Poster {
     board: Board,
@@ -211,7 +210,7 @@ impl Poster {
         }
     }
 
-    /// Whether it is time to bring a report up to date and post it.
+    /// Whether an update of the report is due.
     pub(super) fn is_due(&self) -> bool {
         self.posted.elapsed() >= Self::EVERY
     }
@@ -222,7 +221,7 @@ impl Poster {
     }
 }
 
-/// An error and what it comes from, in one line.
+/// An error and its causes, in one line.
 pub(super) fn text_of(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();

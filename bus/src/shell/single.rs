@@ -1,4 +1,4 @@
-//! A tree of one stage, over links that are open.
+//! A group of one stage, over open links.
 
 use super::report::{Outcome, Report};
 use super::tree::{Outlet, Post, Tree, Turn, branch};
@@ -7,8 +7,8 @@ use crate::link::{Receiver, Sender};
 use crate::sample::{Health, Sample};
 use crate::stage::{Source, Stage};
 
-/// Runs `source` into `output` until it ends or is told to stop. When it fails its stream gets no
-/// end: it may be started again.
+/// Runs `source` into `output` until it ends or a stop is requested. After a failure its stream gets no end, so that
+/// the source can be restarted.
 pub fn run_source<T: Sample>(
     context: &Context,
     source: &mut dyn Source<T>,
@@ -23,10 +23,10 @@ pub fn run_source<T: Sample>(
     )
 }
 
-/// Runs `stage` from `input` to `output` until the input ends or it is told to stop.
+/// Runs `stage` from `input` to `output` until the input ends or a stop is requested.
 ///
-/// Told to stop, it first deals with what has arrived. When the stage fails its stream gets no end:
-/// it may be started again.
+/// On a stop request it first processes the samples that have arrived. After a failure its stream gets no end, so
+/// that the stage can be restarted.
 pub fn run_stage<I: Sample, O: Sample>(
     context: &Context,
     stage: &mut dyn Stage<I, O>,

@@ -1,4 +1,4 @@
-//! The loops around a sink: one thread for each input, and one for all that are looked at now and then.
+//! Run loops of a sink: one thread for each input with notifications, and one for all polled inputs.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -11,18 +11,18 @@ use crate::sample::{Health, SampleRef};
 use crate::seat::AnyReceiver;
 use crate::stage::{Sink, StageError};
 
-/// A stream that a sink hears.
+/// A stream that a sink receives.
 pub struct SinkInput {
-    /// The stage it comes from.
+    /// Name of the stage that emits the stream.
     pub from: String,
-    /// The link.
+    /// Receiving end of the link.
     pub receiver: Box<dyn AnyReceiver>,
-    /// Where nobody wakes it: how often it is looked whether samples are there.
+    /// Polling interval, if no notification wakes the receiver.
     pub looks: Option<Duration>,
 }
 
-/// Runs `sink` until all its inputs have ended or it is told to stop; then it first deals with what
-/// has arrived. Samples are handed over where they lie, one at a time, in the order of arrival.
+/// Runs `sink` until all its inputs have ended or a stop is requested. On a stop request it first processes the
+/// samples that have arrived. Samples are passed in place, one at a time, in the order of arrival.
 pub fn run_sink(
     context: &Context,
     sink: &mut dyn Sink,
@@ -47,7 +47,7 @@ pub fn run_sink(
         failure: None,
         ledger,
     });
-    // One input's failure ends the others too; the caller's own stop is not touched.
+    // A failure of one input also ends the others, without setting the caller's stop request.
     let broken = Stop::new();
     let ears = inputs.into_iter().enumerate().map(|(index, input)| Ear {
         index,
@@ -88,18 +88,18 @@ struct SinkShell<'a> {
     poster: Poster,
     report: Report,
     sink: &'a mut dyn Sink,
-    /// When the sink was last given something.
+    /// Time of the last sample or idle call.
     active: Instant,
     failure: Option<StageError>,
     ledger: &'a Ledger,
 }
 
-/// What the threads around a sink share.
+/// State shared by the threads of a sink.
 struct Hall<'a, 's> {
     context: &'a Context,
     shell: &'a Mutex<SinkShell<'s>>,
     broken: &'a Stop,
-    /// Inputs that are looked at. Locked before the shell.
+    /// Polled inputs. Locked before the shell.
     calm: &'a Mutex<Vec<Ear>>,
 }
 
@@ -107,7 +107,7 @@ struct Hall<'a, 's> {
 struct Ear {
     index: usize,
     input: SinkInput,
-    /// Samples that are still dealt with after a stop.
+    /// Largest number of samples to process after a stop request.
     left_to_take: usize,
     has_ended: bool,
 }
@@ -120,7 +120,7 @@ impl Hall<'_, '_> {
         }
     }
 
-    /// Hears an input to its end.
+    /// Receives an input with notifications to its end.
     fn hear(&self, ear: &mut Ear) -> Result<(), StageError> {
         while !self.broken.is_stopped() && !ear.has_ended {
             if self.take(ear, TICK, true)? == Received::Nothing {
@@ -130,7 +130,7 @@ impl Hall<'_, '_> {
         Ok(())
     }
 
-    /// Looks at the calm inputs to their ends.
+    /// Polls the inputs without notifications to their ends.
     fn look(&self, pause: Duration) -> Result<(), StageError> {
         while !self.broken.is_stopped() {
             let is_over = {
@@ -149,7 +149,7 @@ impl Hall<'_, '_> {
         Ok(())
     }
 
-    /// Takes what is there on the calm inputs.
+    /// Processes the available samples of the polled inputs.
     fn drain(&self, calm: &mut [Ear]) -> Result<(), StageError> {
         for ear in calm {
             let mut left = MAX_DEPTH;
@@ -163,8 +163,8 @@ impl Hall<'_, '_> {
         Ok(())
     }
 
-    /// Takes a sample, if one comes within the time. Before one that is urgent (of an input that is woken for it) comes
-    /// what is there on the calm inputs: it belongs to motions that have come already.
+    /// Processes a sample, if one arrives in time. Before an urgent sample of an input with notifications it drains
+    /// the polled inputs, whose samples are older.
     fn take(&self, ear: &mut Ear, within: Duration, woken: bool) -> Result<Received, StageError> {
         let stopped = self.context.stop.is_stopped();
         let within = if stopped { Duration::ZERO } else { within };
@@ -197,7 +197,7 @@ impl Hall<'_, '_> {
         Ok(received)
     }
 
-    // No code panics while it holds the lock but the sink, which takes the scope down with it.
+    // Only the sink may panic while this lock is held, and its panic ends the whole scope.
     fn calm(&self) -> MutexGuard<'_, Vec<Ear>> {
         self.calm.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -267,7 +267,7 @@ impl SinkShell<'_> {
     }
 }
 
-// A sink that panics takes its thread down, and the scope with it: nobody reads a torn state.
+// A panic of the sink ends its thread and the whole scope, so that an inconsistent state is never read.
 fn lock<'a, 's>(shared: &'a Mutex<SinkShell<'s>>) -> MutexGuard<'a, SinkShell<'s>> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,7 +1,8 @@
-//! The loop around a tree: a source, or a stage that hears a link, and all stages of this process that hang on it.
+//! Run loop of a stage group: a source, or a stage that receives from a link, and all stages behind it in one thread.
+//! The group is a tree, because each stage has one input.
 //!
-//! A sample is handed to the stages that hear it where it lies, as soon as it is emitted and one after the other. There
-//! is no queue, no other thread, and no memory is allocated. Only then does it go to those who hear it over links.
+//! A sample is passed in place to the stages that receive it, one after the other, as soon as it is emitted. There is
+//! no queue, no other thread, and no memory allocation. Only then is it sent over links.
 
 mod node;
 mod root;
@@ -23,35 +24,35 @@ pub use turn::Turn;
 use node::walk;
 use root::{Linked, Root, SourceRoot};
 
-/// How often the wait for receivers looks whether the tree is to stop.
-/// Resolution: how soon a stop is noticed.
+/// Interval at which the wait for receivers checks for a stop request.
+/// Resolution: delay of a stop.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
-/// What a stage of a tree has besides its streams of samples.
+/// Parts of a stage in a group, in addition to its streams of samples.
 pub struct Post<'a> {
-    /// The stage's name.
+    /// Name of the stage.
     pub stage: String,
-    /// How often it has been started again.
+    /// Number of restarts of the stage.
     pub restarts: u64,
-    /// The stage that it hears; empty for a source.
+    /// Name of the stage whose stream it receives; empty for a source.
     pub from: String,
-    /// Where its health reports go.
+    /// Sender of its health reports.
     pub health: Box<dyn Sender<Health> + 'a>,
-    /// Where it keeps its counts.
+    /// Counters that survive a crash.
     pub ledger: Ledger,
 }
 
-/// Opens the link that the first stage of a tree hears, once all who hear the tree are there.
+/// Opens the input link of a group, once all receivers of the group are connected.
 pub type Opening<'a, I> = Box<dyn FnOnce() -> Result<Box<dyn Receiver<I> + 'a>, LinkError> + 'a>;
 
-/// Stages of one thread.
+/// A stage group: stages that run in one thread.
 pub struct Tree<'a> {
     turn: Turn,
     root: Box<dyn Root + 'a>,
 }
 
 impl<'a> Tree<'a> {
-    /// A tree that grows from a source.
+    /// A group that starts with a source.
     pub fn of_source<T: Sample>(
         turn: &Turn,
         post: Post<'a>,
@@ -64,7 +65,7 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// A tree that grows from a link.
+    /// A group whose first stage receives from a link.
     pub fn of_link<I: Sample>(
         turn: &Turn,
         first: Box<dyn Branch<I> + 'a>,
@@ -76,8 +77,8 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// Waits until all who hear the tree are there, no longer than `within`, and says by stage how many are missing.
-    /// Then the tree hears, too.
+    /// Waits at most `within` until all receivers of the group are connected, and reports the number of missing ones
+    /// for each stage. Then opens the input link.
     ///
     /// # Errors
     /// If a link fails or cannot be opened.
@@ -106,7 +107,7 @@ impl<'a> Tree<'a> {
         self.open()
     }
 
-    /// Hears without waiting for who hears it.
+    /// Opens the input link without waiting for receivers.
     ///
     /// # Errors
     /// If the link cannot be opened.
@@ -114,14 +115,14 @@ impl<'a> Tree<'a> {
         self.root.open()
     }
 
-    /// Runs until its source or its link ends, or it is told to stop. Where one of its stages fails or panics, none of
-    /// its streams gets an end: the tree may be started again.
+    /// Runs until the source or the input link ends, or a stop is requested. If a stage fails or panics, no stream of
+    /// the group gets an end, so that the group can be restarted.
     pub fn run(mut self, context: &Context) -> Vec<Report> {
         let driven = catch_unwind(AssertUnwindSafe(|| self.drive(context)));
         let (stage, outcome) = match driven {
             Ok(Ok(outcome)) => {
                 let mut reports = self.reports();
-                // Only the first hears whether it is to stop; for the others a stream ends.
+                // A stop request stops the first stage only; the others end with their input.
                 for (place, report) in reports.iter_mut().enumerate() {
                     let outcome = if place == 0 {
                         &outcome
@@ -173,7 +174,7 @@ impl<'a> Tree<'a> {
         Ok(outcome)
     }
 
-    /// What each stage has done, in the order of the tree, the first one first.
+    /// Reports of all stages in the order of the group, beginning with the first stage.
     fn reports(&mut self) -> Vec<Report> {
         let mut reports = Vec::new();
         self.root.count();
@@ -187,7 +188,7 @@ impl<'a> Tree<'a> {
     }
 }
 
-/// Says in the reports of a tree that one of its stages failed, and the others with it.
+/// Sets the outcomes of a group in which one stage has failed and the others end with it.
 pub(super) fn fell(reports: &mut [Report], stage: &str, outcome: &Outcome) {
     for report in reports {
         report.outcome = Some(if report.stage == stage {
@@ -198,9 +199,9 @@ pub(super) fn fell(reports: &mut [Report], stage: &str, outcome: &Outcome) {
     }
 }
 
-/// What a panic says.
+/// Message of a panic.
 pub(super) fn words_of(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| panic.downcast_ref::<&str>().copied())
-        .unwrap_or("it says nothing of why")
+        .unwrap_or("no message")
 }

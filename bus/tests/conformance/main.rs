@@ -1,6 +1,6 @@
-//! The promises that every link keeps, whatever carries it.
+//! Conformance suite: the guarantees of every link, over each transport.
 
-// Helpers outside a test function; and numbers are compared that were only copied.
+// Helpers outside a test function; the compared numbers are exact copies.
 #![allow(clippy::unwrap_used, clippy::float_cmp)]
 
 use std::time::{Duration, Instant};
@@ -13,14 +13,14 @@ use tauscope_bus::{
 
 mod promises;
 
-/// Nothing here takes as long where all is well.
+/// Timeout of a failing test.
 const LONG: Duration = Duration::from_secs(20);
 const STREAM: &str = "cell/stage";
 
-/// Both sides of a transport, on their own as far as it goes.
+/// Both sides of a transport, as independent as the transport allows.
 trait Sides: Sized {
     type Transport: Transport;
-    /// Whether a sender keeps for later what a receiver has no room for.
+    /// Whether a sender keeps samples for a stalled receiver.
     const REMEMBERS: bool;
     fn new(patience: Duration) -> Self;
     fn sending(&self) -> &Self::Transport;
@@ -69,7 +69,7 @@ impl Sides for SharedMemorySides {
     }
 }
 
-/// Shared memory with receivers that look for themselves.
+/// Shared memory with polling receivers.
 struct LookingSides<const INTERVAL_MS: u64>(SharedMemorySides);
 
 impl<const INTERVAL_MS: u64> Sides for LookingSides<INTERVAL_MS> {
@@ -99,14 +99,14 @@ impl Drop for SharedMemorySides {
     }
 }
 
-/// Room for more samples than receivers have.
+/// Window of a sender larger than the queues of the receivers.
 const SPILL: SpillSettings = SpillSettings {
     bytes: 1000 * size_of::<JointState>(),
     linger_ms: 0,
     waits: true,
 };
 
-/// Two sessions that meet directly.
+/// Two directly connected sessions.
 struct ZenohSides {
     sending: Zenoh,
     receiving: Zenoh,
@@ -130,7 +130,7 @@ impl Sides for ZenohSides {
     }
 }
 
-/// The same, with samples that wait for more.
+/// Two directly connected sessions, the sending one with a batching delay.
 struct GatheringSides(ZenohSides);
 
 impl Sides for GatheringSides {
@@ -187,8 +187,7 @@ impl Sides for ZenohHostSides {
     }
 }
 
-/// Opens something that listens, and says where. Another process may be quicker to take a port that
-/// was free.
+/// Opens a listener and returns its endpoint. Retries, because another process may take a free port first.
 fn listening<R>(open: impl Fn(&ZenohEndpoints) -> Result<R, LinkError>) -> (R, String) {
     let mut attempts = (0..20).map(|_| {
         let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap();

@@ -1,11 +1,11 @@
-//! One function per promise, over any transport.
+//! One function per guarantee, over any transport.
 
 use super::{
     Audience, Duration, Instant, JointState, Keep, LONG, LinkError, Received, Receiver, STREAM,
     Sender, Sides, Transport, TwinState, next, send, take, take_to_end,
 };
 
-/// Lets the receivers look for the sender until it hears of all of them.
+/// Polls the receivers until the sender is connected to all of them.
 fn meet(sender: &mut dyn Sender<JointState>, receivers: &mut [&mut Box<dyn Receiver<JointState>>]) {
     let deadline = Instant::now() + LONG;
     while sender.wait_for_receivers(Duration::from_millis(5)).unwrap() > 0 {
@@ -17,7 +17,7 @@ fn meet(sender: &mut dyn Sender<JointState>, receivers: &mut [&mut Box<dyn Recei
     }
 }
 
-/// Waits until the sender hears that so many of its receivers are missing.
+/// Waits until the sender reports `missing` receivers as missing.
 fn missing_becomes(sender: &mut dyn Sender<JointState>, missing: usize) {
     let deadline = Instant::now() + LONG;
     loop {
@@ -72,7 +72,7 @@ pub fn late_joiner_hears_the_rest<S: Sides>() {
     early.receive(Duration::ZERO, &mut |_| {}).unwrap();
     missing_becomes(&mut *sender, 1);
     send(&mut *sender, 0, 5);
-    // So that nothing is on its way any more.
+    // No sample may be in transit when the late receiver connects.
     assert_eq!(take(&mut *early, 5), [0, 1, 2, 3, 4]);
     let mut late = sides.receiving().receiver(STREAM, Keep::All, 64).unwrap();
     meet(&mut *sender, &mut [&mut late]);
@@ -105,7 +105,7 @@ pub fn slow_reader_that_keeps_all_loses_nothing<S: Sides>() {
     assert_eq!(sender.counts().undelivered, 0);
 }
 
-/// Two receivers on one stream: the one that keeps all tells when everything has arrived.
+/// Two receivers on one stream: the end at the keep-all receiver shows that all samples have arrived.
 pub fn slow_reader_that_keeps_the_newest_loses_the_oldest<S: Sides>() {
     let sides = S::new(LONG);
     let mut all = sides.receiving().receiver(STREAM, Keep::All, 64).unwrap();
@@ -141,7 +141,7 @@ pub fn stuck_reader_is_given_up_and_counted<S: Sides>() {
     send(&mut *sender, 0, 50);
     assert_eq!(take(&mut *other, 50), (0..50).collect::<Vec<_>>());
     assert!(begin.elapsed() < LONG / 2, "patience is used up once");
-    // It comes to its senses: what was kept for it, and then what is sent from now on.
+    // The hung receiver recovers: it gets the samples kept for it, and then the new ones.
     let mut heard = take(&mut *stuck, 4);
     assert_eq!(heard, [0, 1, 2, 3]);
     send(&mut *sender, 50, 2);
@@ -166,11 +166,11 @@ pub fn receiver_gone_and_back<S: Sides>() {
     send(&mut *sender, 0, 1);
     assert_eq!(take(&mut *goes, 1), [0]);
     drop(goes);
-    // With one unread sample it would be full: a sender that waited for it would not come through.
+    // Its queue would be full with one unread sample, and would block a sender that waits for it.
     let begin = Instant::now();
     send(&mut *sender, 1, 3);
     assert!(begin.elapsed() < LONG);
-    // So that nothing is on its way any more.
+    // No sample may be in transit when the receiver reconnects.
     assert_eq!(take(&mut *stays, 4), [0, 1, 2, 3]);
     missing_becomes(&mut *sender, 1);
     let mut back = sides.receiving().receiver(STREAM, Keep::All, 64).unwrap();
@@ -252,7 +252,7 @@ pub fn missing_receivers_are_told<S: Sides>() {
     missing_becomes(&mut *sender, 0);
 }
 
-/// When the link is opened, or, where that cannot be known yet, when the first sample comes.
+/// Refusal when the link is opened or, if the type is not known yet, with the first sample.
 pub fn another_type_is_refused<S: Sides>() {
     let sides = S::new(LONG);
     let mut sender = sides
@@ -286,7 +286,7 @@ pub fn another_type_is_refused<S: Sides>() {
     }
 }
 
-/// What a sender that is out of its mind sends is refused at the receiving end, and the rest is heard.
+/// Invalid samples of a faulty sender are refused at the receiving end, and valid ones are accepted.
 pub fn what_no_stage_may_see_is_refused_and_counted<S: Sides>() {
     let sides = S::new(LONG);
     let mut receiver = sides.receiving().receiver(STREAM, Keep::All, 64).unwrap();
@@ -312,7 +312,7 @@ pub fn what_no_stage_may_see_is_refused_and_counted<S: Sides>() {
     assert_eq!((counts.received, counts.refused, counts.lost), (2, 4, 0));
 }
 
-/// What was sent before a receiver came in is known to it, so that its books balance with the sender's.
+/// A receiver knows the number of samples sent before it connected, so that its counters match the sender's.
 pub fn what_a_late_joiner_missed_is_known<S: Sides>() {
     let sides = S::new(LONG);
     let mut early = sides.receiving().receiver(STREAM, Keep::All, 64).unwrap();
@@ -320,7 +320,7 @@ pub fn what_a_late_joiner_missed_is_known<S: Sides>() {
     early.receive(Duration::ZERO, &mut |_| {}).unwrap();
     missing_becomes(&mut *sender, 1);
     send(&mut *sender, 0, 5);
-    // So that nothing is on its way any more.
+    // No sample may be in transit when the late receiver connects.
     assert_eq!(take(&mut *early, 5), [0, 1, 2, 3, 4]);
     let mut late = sides.receiving().receiver(STREAM, Keep::All, 64).unwrap();
     meet(&mut *sender, &mut [&mut late]);
@@ -335,7 +335,7 @@ pub fn what_a_late_joiner_missed_is_known<S: Sides>() {
     assert_eq!((late.counts().before, late.counts().lost), (5, 0));
 }
 
-/// A receiver that died and takes up where it was counts what was sent in between.
+/// A crashed receiver that resumes counts the samples sent in between.
 pub fn loss_over_a_restart_of_the_receiver_is_counted<S: Sides>() {
     let sides = S::new(LONG);
     let open = || {
@@ -358,7 +358,7 @@ pub fn loss_over_a_restart_of_the_receiver_is_counted<S: Sides>() {
     second.resume(position);
     assert_eq!(sender.wait_for_receivers(LONG).unwrap(), 0);
     send(&mut *sender, 20, 1);
-    // Over a network it may still hear some that were on their way.
+    // Over a network it may still receive samples that were in transit.
     let heard: Vec<_> = std::iter::from_fn(|| next(&mut *second))
         .take_while(|&stamp| stamp < 20)
         .collect();

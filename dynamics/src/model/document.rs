@@ -1,8 +1,7 @@
-//! The URDF as XML: where things stand and what was written, which the URDF reader does not tell.
+//! The URDF as XML: places of elements and attributes as written, which the URDF reader does not return.
 //!
-//! `urdf-rs` gives no lines, takes what is missing for zero (limits), skips words that are no numbers
-//! in a vector, and reads an unexpanded xacro as a robot without links. So the XML is looked at
-//! first.
+//! `urdf-rs` gives no line numbers, reads missing limits as zero, skips words in a vector that are not numbers, and
+//! reads an unexpanded xacro as a robot without links. So the XML is inspected first.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -20,11 +19,11 @@ const MAX_NODES: u32 = 200_000;
 /// Most links and joints together: ten times those of a humanoid with hands.
 /// Resolution: bounds time.
 const MAX_PARTS: usize = 2000;
-/// Deepest element in others.
+/// Greatest depth of nested elements.
 /// Resolution: bounds the stack.
 const MAX_DEPTH: usize = 64;
 
-/// Where the links and joints stand and which limits are given, each in document order.
+/// Lines of the links and joints and the limits that are given, each in document order.
 #[derive(Debug)]
 pub(super) struct Marks {
     pub link_lines: Vec<u32>,
@@ -41,10 +40,10 @@ pub(super) struct JointMarks {
     pub effort: bool,
 }
 
-/// Looks the XML over.
+/// Inspects the XML.
 ///
 /// # Errors
-/// If it is not XML, not a URDF, a xacro, or a number in it is none.
+/// If it is not XML, not a URDF, a xacro, or contains an invalid number.
 pub(super) fn inspect(xml: &str) -> Result<Marks, ModelError> {
     let document = parse(xml)?;
     let root = document.root_element();
@@ -67,7 +66,7 @@ pub(super) fn inspect(xml: &str) -> Result<Marks, ModelError> {
     })
 }
 
-/// The document, unless it is larger than any robot's.
+/// Parses the document, unless it is larger than any robot's.
 pub(super) fn parse(xml: &str) -> Result<Document<'_>, ModelError> {
     if xml.len() > MAX_BYTES {
         return Err(ModelError::TooLarge {
@@ -86,7 +85,7 @@ pub(super) fn parse(xml: &str) -> Result<Document<'_>, ModelError> {
             found: MAX_NODES as usize + 1,
             limit: MAX_NODES as usize,
         },
-        // Its place is that of the first letter.
+        // The parser reports the place of the first letter.
         Error::UnexpectedEndOfStream => {
             let last = xml.lines().last().unwrap_or_default();
             ModelError::Xml {
@@ -99,7 +98,7 @@ pub(super) fn parse(xml: &str) -> Result<Document<'_>, ModelError> {
     })
 }
 
-/// Refuses what would take minutes: many links, or elements nested deep.
+/// Refuses documents that would take minutes: many links, or deeply nested elements.
 fn bound(document: &Document) -> Result<(), ModelError> {
     let links = elements(document.root_element())
         .filter(|node| is_any(*node, &["link", "joint"]))
@@ -126,7 +125,7 @@ fn bound(document: &Document) -> Result<(), ModelError> {
     Ok(())
 }
 
-/// The link or joint that the URDF reader stumbled over, which it does not name: each is read alone.
+/// Error with the link or joint that the URDF reader failed at. The reader does not name it, so each is read alone.
 pub(super) fn blame(xml: &str, error: &urdf_rs::UrdfError) -> ModelError {
     let document = match parse(xml) {
         Ok(document) => document,
@@ -170,7 +169,7 @@ fn not_xml(error: &Error) -> ModelError {
     }
 }
 
-/// A `xmlns:xacro` alone is left over in every expanded file and means nothing.
+/// Refuses an unexpanded xacro. A `xmlns:xacro` alone is harmless: it remains in every expanded file.
 fn refuse_xacro(document: &Document) -> Result<(), ModelError> {
     for node in document.descendants().filter(Node::is_element) {
         let name = node.tag_name();
@@ -194,7 +193,7 @@ fn refuse_xacro(document: &Document) -> Result<(), ModelError> {
     Ok(())
 }
 
-/// The attributes that hold numbers, and how many; limits may be infinite.
+/// Attributes with numbers, and the count of numbers; limits may be infinite.
 const NUMBERS: &[(&str, &[&str], usize)] = &[
     ("origin", &["xyz", "rpy"], 3),
     ("axis", &["xyz"], 3),
@@ -204,8 +203,8 @@ const NUMBERS: &[(&str, &[&str], usize)] = &[
     ("limit", &["lower", "upper", "velocity", "effort"], 1),
 ];
 
-/// Elements of a joint that describe its motion. A fixed joint has none, so that any content is allowed there: exporters
-/// leave a zero or an empty axis behind.
+/// Elements of a joint that describe its motion. A fixed joint has no motion, so their content is ignored there:
+/// exporters leave a zero or an empty axis behind.
 const OF_MOTION: &[&str] = &[
     "axis",
     "limit",
@@ -215,7 +214,7 @@ const OF_MOTION: &[&str] = &[
     "safety_controller",
 ];
 
-/// Whether `node` is an element that has no meaning because its joint is fixed.
+/// Whether `node` is an element without effect, because its joint is fixed.
 fn is_unused(node: Node) -> bool {
     let is_fixed = |joint: Node| {
         joint.has_tag_name("joint") && joint.attribute("type").map(str::trim) == Some("fixed")

@@ -6,13 +6,13 @@ use roxmltree::{Document, Node};
 
 use super::document::elements;
 
-/// Namespace of the attributes that a MuJoCo model's joint has and a URDF's has not.
+/// Namespace of the attributes of a MuJoCo model's joint that a URDF lacks.
 pub const MUJOCO: &str = "http://www.mujoco.org";
 /// Namespace of Drake's elements.
 const DRAKE: &str = "http://drake.mit.edu";
 
-/// Friction, rotor and spring of a joint; zero where the file has none. A URDF's `<dynamics>` does not count: exporters write
-/// placeholders there.
+/// Friction, rotor and spring of a joint; zero if the file has none. A URDF's `<dynamics>` is ignored, because
+/// exporters write placeholders there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Drive {
     /// Viscous friction \[N m s/rad or N s/m\].
@@ -63,14 +63,14 @@ pub(super) fn drives(document: &Document<'_>) -> BTreeMap<String, Drive> {
     all
 }
 
-/// A number; zero where there is none.
+/// Parses a number; zero without one.
 fn number(text: Option<&str>) -> f64 {
     let number = text.and_then(|text| text.trim().parse::<f64>().ok());
     number.filter(|x| x.is_finite()).unwrap_or(0.0)
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#[allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 mod tests {
     use super::*;
 

@@ -1,6 +1,6 @@
-//! What keeps a text from being a robot.
+//! Errors of reading a URDF.
 
-/// Why a URDF cannot be used. Lines count from 1.
+/// Reason why a URDF cannot be used. Lines count from 1.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModelError {
     /// The text is not XML.
@@ -10,17 +10,17 @@ pub enum ModelError {
         line: u32,
         /// Column.
         column: u32,
-        /// What the XML reader says.
+        /// Message of the XML reader.
         reason: String,
     },
     /// The document is larger than any robot's.
     #[error("{found} {what}: more than {limit}, which is the limit for a URDF")]
     TooLarge {
-        /// What there is too much of.
+        /// Kind of the excess elements.
         what: &'static str,
-        /// How much there is at least.
+        /// Lower bound on their number.
         found: usize,
-        /// How much there may be.
+        /// Largest number allowed.
         limit: usize,
     },
     /// The text is a xacro template.
@@ -45,7 +45,7 @@ pub enum ModelError {
         /// The document's outermost element.
         found: String,
     },
-    /// A joint mimics one that is not there.
+    /// A joint mimics one that does not exist.
     #[error("line {line}: joint `{joint}` mimics joint `{mimics}`, which the robot does not have")]
     UnknownMimic {
         /// Line of the joint.
@@ -63,7 +63,7 @@ pub enum ModelError {
         /// One of the joints.
         joint: String,
     },
-    /// A number is not one.
+    /// An attribute is not a valid number.
     #[error("line {line}: {element} has {attribute}=\"{text}\": not {expected}")]
     Number {
         /// Line.
@@ -74,7 +74,7 @@ pub enum ModelError {
         attribute: String,
         /// Its text.
         text: String,
-        /// What is expected.
+        /// Expected text.
         expected: &'static str,
     },
     /// The document breaks the URDF format in another way.
@@ -84,10 +84,10 @@ pub enum ModelError {
         line: u32,
         /// The link or joint, or else the robot.
         element: String,
-        /// What the URDF reader says.
+        /// Message of the URDF reader.
         reason: String,
     },
-    /// Two links of one name.
+    /// Two links with the same name.
     #[error("line {line}: a second link `{link}`; the first is on line {first_line}")]
     DuplicateLink {
         /// The name.
@@ -97,7 +97,7 @@ pub enum ModelError {
         /// Line of the second.
         line: u32,
     },
-    /// Two joints of one name.
+    /// Two joints with the same name.
     #[error("line {line}: a second joint `{joint}`; the first is on line {first_line}")]
     DuplicateJoint {
         /// The name.
@@ -107,7 +107,7 @@ pub enum ModelError {
         /// Line of the second.
         line: u32,
     },
-    /// A joint names a link that is not there.
+    /// A joint names a link that does not exist.
     #[error("line {line}: joint `{joint}` names the {role} link `{link}`, which is not there")]
     UnknownLink {
         /// Line.
@@ -119,7 +119,7 @@ pub enum ModelError {
         /// The missing link.
         link: String,
     },
-    /// A joint of a kind that the dynamics do not know.
+    /// A joint of an unsupported kind.
     #[error(
         "line {line}: joint `{joint}` is {kind}; revolute, continuous, prismatic and fixed joints are supported"
     )]
@@ -131,7 +131,7 @@ pub enum ModelError {
         /// Its kind.
         kind: &'static str,
     },
-    /// A movable joint without a direction.
+    /// A movable joint whose axis is zero.
     #[error("line {line}: the axis of joint `{joint}` is zero")]
     ZeroAxis {
         /// Line.
@@ -139,7 +139,7 @@ pub enum ModelError {
         /// The joint.
         joint: String,
     },
-    /// A link weighs less than nothing.
+    /// A link with a negative mass.
     #[error("line {line}: the mass of link `{link}` is {mass_kg} kg")]
     NegativeMass {
         /// Line.
@@ -149,7 +149,7 @@ pub enum ModelError {
         /// The mass.
         mass_kg: f64,
     },
-    /// A link that two joints move.
+    /// A link that is the child of two joints.
     #[error("line {line}: link `{link}` is the child of both `{first}` and `{second}`")]
     TwoParents {
         /// Line of the second joint.
@@ -161,7 +161,7 @@ pub enum ModelError {
         /// The other.
         second: String,
     },
-    /// The robot is in pieces.
+    /// The robot has several roots.
     #[error(
         "{} links have no parent joint: {}. A robot has one root: connect them to one link by fixed joints, or use one URDF for \
          each arm",
@@ -172,19 +172,19 @@ pub enum ModelError {
         /// The links that are no joint's child.
         roots: Vec<String>,
     },
-    /// Joints that close a ring.
+    /// Joints that form a cycle.
     #[error("the joints form a cycle: {}", list(joints))]
     Cycle {
-        /// The joints of the ring, in order.
+        /// The joints of the cycle, in order.
         joints: Vec<String>,
     },
-    /// Nothing can move.
+    /// The robot has no movable joint.
     #[error("the robot `{robot}` has no movable joint")]
     NothingMoves {
         /// The robot.
         robot: String,
     },
-    /// What a joint moves weighs nothing: the dynamics would be meaningless.
+    /// The bodies that a joint moves have no mass: the dynamics would be meaningless.
     #[error(
         "line {line}: joint `{joint}` moves no mass: {} without a mass in <inertial>",
         bodies(links)
@@ -199,10 +199,10 @@ pub enum ModelError {
     },
 }
 
-/// Advice on how to get a URDF from a robot description of another format, by the document's outermost element.
+/// Advice on converting a robot description of another format to URDF, by the document's outermost element.
 fn conversion(root: &str) -> &'static str {
     match root {
-        // Version 0.7.3 of the package converts hinge joints and inertias, and has no command of its own.
+        // Version 0.7.3 of the package converts hinge joints and inertias, and has no command-line program.
         "mujoco" => {
             "; MJCF must be converted first: `pip install mjcf-urdf-simple-converter`, then `python3 -c 'from \
              mjcf_urdf_simple_converter import convert; convert(\"FILE.xml\", \"FILE.urdf\")'` (hinge joints only)"

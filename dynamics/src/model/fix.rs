@@ -1,4 +1,4 @@
-//! Joints of a URDF made fixed, in its text: those of a gripper that nobody records.
+//! Fixing joints in the text of a URDF, for example those of a gripper that are not recorded.
 
 use std::ops::Range;
 
@@ -6,12 +6,12 @@ use super::ModelError;
 use super::document::{elements, parse};
 use super::urdf::{Movable, RawJoint, read};
 
-/// The URDF `xml` with the movable joints of these names made fixed, each where its position is zero, or the next to it
-/// that its limits allow; and those that follow them, where that puts them. All else keeps its text. Names that no movable
-/// joint has are passed over.
+/// Returns the URDF `xml` with the movable joints of these names made fixed, each at the position within its limits
+/// that is nearest to zero. Joints that follow them are fixed at the corresponding positions. All other text stays as
+/// it is. Names without a movable joint are ignored.
 ///
 /// # Errors
-/// What is wrong with the text or its elements.
+/// If the text or its elements are invalid.
 pub fn fix_joints(xml: &str, joints: &[&str]) -> Result<String, ModelError> {
     let robot = read(xml)?;
     let document = parse(xml)?;
@@ -44,7 +44,7 @@ pub fn fix_joints(xml: &str, joints: &[&str]) -> Result<String, ModelError> {
     Ok(fixed)
 }
 
-/// Where a joint is fixed \[rad or m\], if it is one of `fixed` or follows one.
+/// Position at which a joint is fixed \[rad or m\], if it is one of `fixed` or follows one.
 fn position_at_rest(
     joint: &RawJoint,
     movable: &Movable,
@@ -67,7 +67,7 @@ fn position_at_rest(
     }))
 }
 
-/// The `<origin>` of the joint once it is fixed at a position.
+/// The `<origin>` of the joint after it is fixed at a position.
 fn origin_at(joint: &RawJoint, movable: &Movable, position: f64) -> String {
     let pose = joint.origin * movable.moved(position);
     let (roll, pitch, yaw) = pose.rotation.euler_angles();

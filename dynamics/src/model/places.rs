@@ -1,4 +1,4 @@
-//! Which link is which, and a stand-in for a robot that is not known.
+//! Tool link, base link and names of bodies, and a placeholder model for an unknown robot.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -11,9 +11,8 @@ use crate::inertia::Inertia;
 pub(super) const LEAST_SHARE: f64 = 0.01;
 
 impl Model {
-    /// The link that holds tools and payloads: the one named `tool` or, failing that, `tool0`; else,
-    /// of the links on which no other hangs, the one with the most movable joints between it and the
-    /// base, the last of several.
+    /// Link that holds tools and payloads: the one named `tool` or, failing that, `tool0`. Otherwise, among the links
+    /// without children, the one with the most movable joints between it and the base, the last of several.
     pub fn tool_link(&self) -> usize {
         let moves = |link: &usize| self.links[*link].joint.is_some();
         let mut named = ["tool", "tool0"]
@@ -29,7 +28,7 @@ impl Model {
             .unwrap_or(0)
     }
 
-    /// The link that stands still and carries all others.
+    /// Fixed link that carries all others.
     pub fn base_link(&self) -> usize {
         let root = self.links.iter().position(|link| link.parent.is_none());
         root.unwrap_or(0)
@@ -75,8 +74,8 @@ impl Model {
         count
     }
 
-    /// A chain of joints of these names without masses or lengths: the stand-in for a robot of which
-    /// nothing else is known. No motion costs it any effort.
+    /// Creates a chain of joints with these names without masses or lengths: a placeholder for a robot of which only
+    /// the joint names are known. Its motion requires no effort.
     pub fn massless(joint_names: &[String]) -> Self {
         let link = |name: String, parent: Option<usize>| Link {
             name,

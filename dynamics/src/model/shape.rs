@@ -1,4 +1,4 @@
-//! How links look, for drawing.
+//! Shapes of links, for drawing.
 
 use nalgebra::Isometry3;
 
@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 pub struct Shape {
     /// Pose of the geometry in the link's frame.
     pub origin: Isometry3<f64>,
-    /// What is there.
+    /// Geometry.
     pub geometry: Geometry,
 }
 
@@ -33,7 +33,7 @@ pub enum Geometry {
     },
     /// A mesh in a file.
     Mesh {
-        /// The path or URI as the URDF has it; not resolved.
+        /// Path or URI as in the URDF; not resolved.
         filename: String,
         /// Factors along x, y and z.
         scale: [f64; 3],

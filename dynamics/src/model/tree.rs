@@ -1,4 +1,4 @@
-//! From links and joints to the tree the algorithms walk.
+//! Builds the kinematic tree of the algorithms from links and joints.
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
@@ -6,10 +6,10 @@ use super::urdf::{Leader, RawJoint, RawLink, Robot};
 use super::{Body, Follower, Frame, GRAVITY_M_S2, Joint, Link, Load, Model, ModelError};
 use crate::inertia::Inertia;
 
-/// Puts the tree together.
+/// Builds the model.
 ///
 /// # Errors
-/// If the links and joints are no tree, nothing moves, or what moves weighs nothing.
+/// If the links and joints are not a tree, nothing moves, or a moving body has no mass.
 pub(super) fn build(robot: Robot) -> Result<Model, ModelError> {
     let parents = parent_joints(&robot)?;
     let order = parents_first(&robot, &parents)?;
@@ -65,7 +65,7 @@ pub(super) fn build(robot: Robot) -> Result<Model, ModelError> {
         followers,
         links,
         bodies,
-        // Every link is reached: the order holds them all.
+        // Every link is reached: the order contains all of them.
         frames: frames.into_iter().flatten().collect(),
         gravity: Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
         tool_on: None,
@@ -88,7 +88,7 @@ pub(super) fn parent_joints(robot: &Robot) -> Result<Vec<Option<usize>>, ModelEr
     Ok(parents)
 }
 
-/// The links in an order in which parents come first, and otherwise as in the document.
+/// Links ordered so that parents come first, and otherwise as in the document.
 pub(super) fn parents_first(
     robot: &Robot,
     parents: &[Option<usize>],
@@ -117,13 +117,13 @@ pub(super) fn parents_first(
         next += 1;
     }
     match links.clone().find(|link| !order.contains(link)) {
-        // One root at most and one parent each: what is not reached hangs on a ring.
+        // There is at most one root and one parent each, so a link that is not reached leads to a cycle.
         Some(link) => Err(cycle(robot, parents, link)),
         None => Ok(order),
     }
 }
 
-/// The ring that one comes to from `link` towards the base.
+/// The cycle that the chain from `link` towards the base ends in.
 fn cycle(robot: &Robot, parents: &[Option<usize>], link: usize) -> ModelError {
     let mut visited: Vec<usize> = Vec::new();
     let mut at = link;
@@ -141,18 +141,18 @@ fn cycle(robot: &Robot, parents: &[Option<usize>], link: usize) -> ModelError {
     ModelError::Cycle { joints: Vec::new() }
 }
 
-/// What moves a joint.
+/// The coordinate that determines a joint's position.
 #[derive(Debug, Clone, Copy)]
 enum Mover {
-    /// It itself: its number among such joints.
+    /// The joint itself: its number among such joints.
     Own(usize),
-    /// The joint of that number, to `ratio` times its position and `offset`.
+    /// The joint of that number: the position is `ratio` times its position, plus `offset`.
     Follows {
         number: usize,
         ratio: f64,
         offset: f64,
     },
-    /// Nothing: it stays at that position \[rad or m\].
+    /// None: the joint stays at that position \[rad or m\].
     Fixed { position: f64 },
 }
 
@@ -231,16 +231,18 @@ fn refuse_massless(
 ) -> Result<(), ModelError> {
     let mut massless: Vec<usize> = bodies
         .iter()
-        // What follows a joint may be without a mass: that joint moves others.
+        // A body that follows a joint may have no mass: the joint moves others.
         .filter(|body| body.own.mass == 0.0 && body.block == body.joint)
         .map(|body| body.joint)
-        // A joint without a mass of its own may move others: the virtual joint of a gripper, which its fingers follow.
+        // A joint without a mass of its own may move others, for example the virtual joint of a gripper, which its
+        // fingers follow.
         .filter(|joint| {
             bodies
                 .iter()
                 .all(|body| body.joint != *joint || body.own.mass == 0.0)
         })
-        // Two joints in one place have a link without mass and shape in between, which carries what the next one moves.
+        // Two joints in one place have a link without mass and shape in between, which carries the bodies of the next
+        // joint.
         .filter(|joint| {
             let own = links.iter().filter(|link| link.joint == Some(*joint));
             let is_drawn = own.flat_map(|link| &link.shapes).next().is_some();
@@ -263,7 +265,7 @@ fn refuse_massless(
     })
 }
 
-/// Whether a body that stands on those of a joint has a mass.
+/// Whether any body that a joint carries has a mass.
 fn carries_mass(bodies: &[Body], joint: usize) -> bool {
     let mut stands = vec![false; bodies.len()];
     // Parents come first.
@@ -297,7 +299,7 @@ impl Builder<'_> {
         });
     }
 
-    /// Hangs the joint's child on its parent, which has its frame already.
+    /// Attaches the joint's child to its parent, whose frame exists already.
     fn hang(&mut self, index: usize, joint: &RawJoint) {
         let Some(parent) = self.frames[joint.parent].clone() else {
             return;
@@ -363,8 +365,8 @@ impl Builder<'_> {
     }
 }
 
-/// A rotation that takes `axis` to z: its rows are a right-handed frame with `axis` as the third. An
-/// axis along x, y or z gives exact zeros and ones.
+/// Rotation that maps `axis` to z: its rows are a right-handed frame with `axis` as the third. An axis along x, y or
+/// z gives exact zeros and ones.
 fn z_to(axis: &Vector3<f64>) -> Matrix3<f64> {
     if *axis == Vector3::z() {
         return Matrix3::identity();

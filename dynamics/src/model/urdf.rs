@@ -51,7 +51,7 @@ pub(super) struct Movable {
 }
 
 impl Movable {
-    /// What a position \[rad or m\] does to the joint's child.
+    /// Pose of the joint's child at a position \[rad or m\], relative to position zero.
     pub fn moved(&self, position: f64) -> Isometry3<f64> {
         let along = self.axis * position;
         match self.kind {
@@ -63,21 +63,21 @@ impl Movable {
     }
 }
 
-/// The joint at whose position another is: `ratio` times it, and `offset`.
+/// The joint that determines the position of another: `ratio` times its position, plus `offset`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Leader {
-    /// Its index, of all joints.
+    /// Its index among all joints.
     pub joint: usize,
     pub ratio: f64,
     pub offset: f64,
 }
 
 impl RawJoint {
-    /// The joint that this one follows in the end, over any number of others; itself where it follows none, `None` where
-    /// it cannot move.
+    /// Joint at the end of the chain of `<mimic>` elements; the joint itself without a `<mimic>`, `None` if it cannot
+    /// move.
     ///
     /// # Errors
-    /// If a `<mimic>` names no joint, or they go round in a circle.
+    /// If a `<mimic>` names no joint, or they form a cycle.
     pub fn leader(&self, joints: &[Self]) -> Result<Option<Leader>, ModelError> {
         let place = |name: &str| joints.iter().position(|joint| joint.name == name);
         let (mut at, mut ratio, mut offset) = (self, 1.0, 0.0);
@@ -124,7 +124,7 @@ pub(super) struct Follows {
 /// Reads the document.
 ///
 /// # Errors
-/// What is wrong with it, or with a link or joint taken by itself.
+/// If the document, a link or a joint is invalid by itself.
 pub(super) fn read(xml: &str) -> Result<Robot, ModelError> {
     let marks = document::inspect(xml)?;
     let used = document::without_unused(xml)?;
@@ -260,7 +260,7 @@ fn read_joint(
 fn limits(kind: JointKind, limit: &urdf_rs::JointLimit, marks: &JointMarks) -> Limits {
     let known = |given: bool, value: f64| (given && value.is_finite()).then_some(value);
     let bounded = kind != JointKind::Continuous;
-    // Limits that leave no room are a slip of the pen: nobody knows what was meant.
+    // Limits whose lower bound is not below the upper one are a mistake of unknown intent.
     let leave_none = bounded && limit.lower >= limit.upper && (marks.lower || marks.upper);
     let bounded = bounded && limit.lower < limit.upper;
     Limits {
@@ -285,7 +285,7 @@ fn geometry(geometry: urdf_rs::Geometry) -> Geometry {
             radius_m: radius,
             length_m: length,
         },
-        // Drawn as the cylinder that just holds it.
+        // Drawn as the circumscribed cylinder.
         urdf_rs::Geometry::Capsule { radius, length } => Geometry::Cylinder {
             radius_m: radius,
             length_m: length + 2.0 * radius,

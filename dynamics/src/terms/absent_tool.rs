@@ -1,4 +1,4 @@
-//! A body that the twin carries and the arm does not.
+//! A body of the twin that the arm does not carry.
 
 use super::ghost::{Ghost, While};
 use super::law::array;
@@ -6,18 +6,20 @@ use super::payload::{BODY_COORDINATES, BODY_PARAMETERS, inertia, parameters};
 use super::{Effect, Excitation, Family, Layer, PlaceKind, Simulated, Traits, Words};
 use crate::{Inertia, Model};
 
-/// Of less than this share no tool is missing: the bodies of a URDF are off by as much.
+/// Smallest missing share of the carried mass that is reported as an absent tool: the bodies of a URDF may be wrong
+/// by less.
 /// Physical: a fifth; drawings and weighed arms differ by a twentieth to a tenth.
 pub const LEAST_ABSENT: f64 = 0.2;
 
-/// A mass \[kg\] as a share of all that the joint of a link carries in the model, up to the next joint.
+/// Mass \[kg\] as a share of the mass that the joint of a link carries in the model, up to the next joint.
 pub fn share_of_carried(model: &Model, link: usize, mass_kg: f64) -> f64 {
     let links = model.links();
     let same = links.iter().filter(|one| one.joint == links[link].joint);
     mass_kg / same.map(|one| one.inertia.mass_kg()).sum::<f64>()
 }
 
-/// A payload that is taken off: the URDF has a gripper that is not mounted, or one that is heavier than the real one.
+/// A payload with the opposite sign: the URDF has a gripper that is not mounted, or one that is heavier than the real
+/// one.
 pub static EFFECT: Effect = Effect {
     name: "absent_tool",
     words: Words::new(
@@ -39,7 +41,7 @@ pub static EFFECT: Effect = Effect {
     excitation: Excitation::Poses,
     exported: super::Exported::As(|_| vec![super::Quantity::Body]),
     simulated: Simulated::Model,
-    // What can be taken off depends on the URDF.
+    // The bodies that can be removed depend on the URDF.
     concealed: None,
     traits: Traits {
         is_off_list: true,

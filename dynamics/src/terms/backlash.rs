@@ -1,4 +1,4 @@
-//! A joint whose transmission has play.
+//! A joint with backlash in its transmission.
 
 use super::law::array;
 use super::split_joint::split_joint;
@@ -8,23 +8,23 @@ use super::{
     Simpler, Simulated, Traits, Words,
 };
 
-/// Natural frequency \[rad/s\] and damping ratio of the contact on either side of the play: it settles
-/// within some 20 ms and does not bounce. Stiffer contacts only turn the noise of a measured acceleration
-/// into impacts.
+/// Natural frequency \[rad/s\] and damping ratio of the contact on either side of the gap: it settles within about
+/// 20 ms without bouncing. Stiffer contacts only turn the noise of a measured acceleration into impacts.
 /// Tuned: by hand on a simulation of both masses, not swept.
 const CONTACT_FREQUENCY: f64 = 300.0;
-/// Physical: about 1/√2, at which a step of second order hardly overshoots.
+/// Physical: about 1/√2, at which a second-order step response hardly overshoots.
 const CONTACT_DAMPING: f64 = 0.7;
 
-/// Longest step through the play \[s\].
+/// Longest integration step within the gap \[s\].
 /// Physical: a third of the contact's time constant, 1 / 300 rad/s.
 const STEP_S: f64 = 1e-3;
-/// At most so many steps between two samples. Tuned: to bound the work after a gap; not swept.
+/// Largest number of steps between two samples.
+/// Tuned: to bound the work after a gap; not swept.
 const MOST_STEPS: f64 = 200.0;
 
-/// Between rotor and link there is a play of a total width; within it nothing comes through, on either
-/// side a stiff and damped contact pushes and never pulls. The rotor has the inertia J and carries the
-/// encoder; the link starts at rest on the side that it loads.
+/// Rotor and link are separated by a gap of a given total width. Within the gap no torque is transmitted; on either
+/// side a stiff, damped contact pushes and never pulls. The rotor has the inertia J and carries the encoder; the link
+/// starts at rest on the side that it loads.
 pub(super) static EFFECT: Effect = Effect {
     name: "backlash",
     words: Words::new(
@@ -82,17 +82,17 @@ pub(super) static EFFECT: Effect = Effect {
 
 #[derive(Debug)]
 struct Play {
-    /// Half its width \[rad\].
+    /// Half the width of the gap \[rad\].
     half: f64,
 }
 
 impl Play {
-    /// How far the link has gone into a contact \[rad\].
+    /// Penetration of the link into a contact \[rad\].
     fn depth(&self, angle: f64) -> f64 {
         angle - angle.clamp(-self.half, self.half)
     }
 
-    /// Acceleration by the contact; 0 where there is none or it would pull.
+    /// Acceleration by the contact; 0 without contact or if the contact would pull.
     fn push(&self, at: Deviation) -> f64 {
         let depth = self.depth(at.angle);
         let push =

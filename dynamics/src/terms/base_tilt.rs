@@ -1,4 +1,4 @@
-//! A base that does not stand level.
+//! A base that is not level.
 
 use std::f64::consts::TAU;
 
@@ -12,14 +12,14 @@ use super::{
 };
 use crate::{Data, Model, gravity_effort};
 
-/// The base is rolled about its x axis and then pitched about the y axis that results, R = Rx(roll)
-/// Ry(pitch); gravity in its frame is Rᵀ g. To first order linear in the angles.
+/// The base is rolled about its x axis and then pitched about the resulting y axis, R = Rx(roll) Ry(pitch); gravity
+/// in its frame is Rᵀ g. To first order linear in the angles.
 pub(super) static EFFECT: Effect = Effect {
     name: "base_tilt",
     words: Words::new(
         "Base tilt",
         "a base that is tilted",
-        "The base does not stand level, or is mounted otherwise than the model says.",
+        "The base is not level, or its mounting differs from the model.",
         "The base: is it level, are its screws tight, and does the URDF have it as it is mounted?",
         "The base is tilted: roll {roll_rad}, pitch {pitch_rad}.",
     ),
@@ -51,14 +51,14 @@ pub(super) static EFFECT: Effect = Effect {
     build: |site, values| BaseTilt::boxed(&EFFECT, site, values, While::Always),
 };
 
-/// Gravity as the tilted base sees it.
+/// Gravity in the frame of the tilted base.
 fn tilted(gravity: &Vector3<f64>, [roll, pitch]: [f64; 2]) -> Vector3<f64> {
     let roll = Rotation3::from_axis_angle(&Vector3::x_axis(), roll);
     let pitch = Rotation3::from_axis_angle(&Vector3::y_axis(), pitch);
     (roll * pitch).inverse_transform_vector(gravity)
 }
 
-/// A tilt by the first two of its coordinates, for good or for a while.
+/// A tilt by the first two of its coordinates, permanent or temporary.
 #[derive(Debug)]
 pub(super) struct BaseTilt {
     effect: &'static Effect,
@@ -78,7 +78,7 @@ impl BaseTilt {
         let mut model = site.model.clone();
         let level = Vector3::from(model.gravity());
         let tilted = tilted(&level, array(coordinates));
-        // Gravity's effort is linear in gravity: the difference costs the difference.
+        // The effort is linear in gravity, so the difference of gravity gives the difference of effort.
         model.set_gravity((tilted - level).into());
         Box::new(Self {
             effect,

@@ -1,4 +1,4 @@
-//! A base that stands otherwise in one recording than in the others.
+//! A base that is tilted differently in one recording than in the others.
 
 use super::base_tilt::BaseTilt;
 use super::ghost::While;
@@ -15,9 +15,9 @@ pub(super) static EFFECT: Effect = Effect {
     words: Words::new(
         "Base tilt in one recording",
         "a base that is tilted in one recording",
-        "In one recording the base stands otherwise than in the others.",
-        "What carries the base: a vehicle that was parked elsewhere, a cart on soft ground, a loose foot?",
-        "In recording {recording} the base is tilted otherwise than in the others: roll {roll_rad}, pitch {pitch_rad}.",
+        "In one recording the base is tilted differently from the others.",
+        "The support of the base: a vehicle that was parked elsewhere, a cart on soft ground, a loose foot?",
+        "In recording {recording} the base is tilted differently from the others: roll {roll_rad}, pitch {pitch_rad}.",
     ),
     family: Family::Mounting,
     place: PlaceKind::Base,
@@ -78,7 +78,7 @@ mod tests {
             let leans = session_s[i] < middle_s;
             assert_near(now, if leans { always[i] } else { [0.0; 2] });
         }
-        // The robot itself stands level before and after.
+        // The robot itself stays level before and after.
         let mut model: Model = robot.model.clone();
         assert!(!there.alter(&mut model));
         assert_eq!(model.gravity(), robot.model.gravity());

@@ -1,4 +1,4 @@
-//! An effort whose zero jumps once: a torque sensor that is zeroed anew, a current sensor whose offset moves.
+//! An effort whose zero jumps once: a torque sensor that is zeroed again, a current sensor whose offset shifts.
 
 use super::law::joint_law;
 use super::payload_pickup::time;

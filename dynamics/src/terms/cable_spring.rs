@@ -6,7 +6,7 @@ use super::{
     Words,
 };
 
-/// Softer than this it is no spring \[N m/rad\].
+/// Smallest stiffness of a spring \[N m/rad\].
 /// Physical: far below any spring; it only keeps the rest angle finite.
 const LEAST_STIFFNESS: f64 = 1e-9;
 

@@ -1,30 +1,30 @@
-//! An effect at random, for a simulated cell to conceal: its shape is drawn, and sizes are given among which one is
-//! sought that can be seen.
+//! Random effects for a simulated cell to conceal: the shape is drawn, and the size is chosen from a range so that it
+//! is detectable.
 
 use super::Site;
 use crate::{Data, mass_matrix};
 
-/// The share of the motor's effort that friction and springs may take.
+/// Largest share of the motor's effort that friction and springs may take.
 /// Tuned: so that motors of simulated arms can do the motion; not swept.
 const LARGEST_SHARE: f64 = 0.4;
-/// The smallest size tried, as a share of the largest.
+/// Smallest size tried, as a share of the largest.
 /// Tuned: far below what noise lets be seen; not swept.
 const SMALLEST: f64 = 1e-4;
 
-/// Parameters by name, as files hold them.
+/// Parameters by name, as in files.
 pub type Parameters = Vec<(&'static str, f64)>;
 
-/// Random numbers, the same from the same seed.
+/// Pseudo-random numbers from a seed.
 pub trait Chance {
-    /// One between two.
+    /// A random number between two.
     fn between(&mut self, least: f64, most: f64) -> f64;
-    /// A whole one from `least` to `most`.
+    /// A random integer from `least` to `most`.
     fn whole(&mut self, least: u32, most: u32) -> u32;
-    /// One of two.
+    /// A random boolean.
     fn coin(&mut self) -> bool;
 }
 
-/// The place where an effect is drawn, and the motions that are planned there.
+/// The place where an effect is drawn, and the motions planned there.
 pub struct Draw<'a> {
     /// The place.
     pub site: Site<'a>,
@@ -36,13 +36,13 @@ pub struct Draw<'a> {
     pub fastest_rad_s: f64,
     /// Highest acceleration of the joint \[rad/s² or m/s²\].
     pub largest_acceleration_rad_s2: f64,
-    /// The middle of the joint's range, and half its width \[rad or m\].
+    /// Middle of the joint's range \[rad or m\].
     pub middle_rad: f64,
     /// Half the width of the joint's range \[rad or m\].
     pub half_range_rad: f64,
     /// Length of the shortest recording \[s\].
     pub shortest_s: f64,
-    /// When the recording that was drawn starts in the session \[s\].
+    /// Start of the drawn recording in the session \[s\].
     pub start_session_s: f64,
     /// The motions: time since the start of the recording \[s\], and position per joint \[rad or m\].
     pub path: Vec<(f64, &'a [f64])>,
@@ -65,13 +65,13 @@ impl std::fmt::Debug for Draw<'_> {
 }
 
 impl Draw<'_> {
-    /// Efforts that friction and springs may have \[N m or N\].
+    /// Smallest and largest effort of friction and springs \[N m or N\].
     pub fn efforts_nm(&self) -> [f64; 2] {
         let most = LARGEST_SHARE * self.motor_nm;
         [SMALLEST * most, most]
     }
 
-    /// The inertia that the joint moves as the first motion begins \[kg m²\].
+    /// Inertia that the joint moves at the beginning of the first motion \[kg m²\].
     pub fn moved_kgm2(&self) -> Option<f64> {
         let (_, position) = self.path.first()?;
         let model = self.site.model;
@@ -79,18 +79,18 @@ impl Draw<'_> {
         Some(mass_matrix(model, &mut Data::new(model), position)[(j, j)])
     }
 
-    /// The three components of a vector of this size in the random direction.
+    /// Three components of a vector of this size in the random direction.
     pub fn along(&self, names: [&'static str; 3]) -> impl Fn(f64) -> Parameters + use<> {
         let direction = self.direction;
         move |size| names.into_iter().zip(direction.map(|d| d * size)).collect()
     }
 }
 
-/// An effect of any size, all else drawn.
+/// A drawn effect whose size is still free.
 pub struct Drawn {
-    /// Least and largest size.
+    /// Smallest and largest size.
     pub sizes: [f64; 2],
-    /// Its parameters from its size.
+    /// Parameters by size.
     pub parameters: Box<dyn Fn(f64) -> Parameters>,
 }
 
@@ -103,7 +103,7 @@ impl std::fmt::Debug for Drawn {
 }
 
 impl Drawn {
-    /// `None` if there is no such size.
+    /// `None` if the range of sizes is empty or not finite.
     pub fn new(sizes: [f64; 2], parameters: impl Fn(f64) -> Parameters + 'static) -> Option<Self> {
         let possible = sizes[0] > 0.0 && sizes[0] < sizes[1] && sizes[1].is_finite();
         possible.then(|| Self {

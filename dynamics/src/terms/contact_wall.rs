@@ -1,4 +1,4 @@
-//! A springy wall that the arm runs into.
+//! An elastic wall that the arm runs into.
 
 use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -11,13 +11,14 @@ use super::{
 };
 use crate::{Data, forward_kinematics, link_pose};
 
-/// The wall's range that is searched \[m\]. Physical: farther than any arm on a fixed base reaches.
+/// Largest distance of a wall that is searched \[m\].
+/// Physical: farther than any arm on a fixed base reaches.
 const RANGE_M: f64 = 10.0;
-/// A wall is drawn so that the arm is in it for a fifth of the time.
+/// Reciprocal of the share of time that the arm is in a drawn wall: a fifth.
 /// Tuned: for simulated cells only; not swept.
 const IN_IT: usize = 5;
 
-/// How far away a wall is that the arm is in for that share of the time \[m\]; `None` if it begins in it.
+/// Distance of a wall that the arm is in for that share of the time \[m\]; `None` if the arm begins in it.
 fn drawn_offset(draw: &Draw<'_>) -> Option<f64> {
     let normal = draw.direction;
     let model = draw.site.model;
@@ -39,8 +40,8 @@ fn drawn_offset(draw: &Draw<'_>) -> Option<f64> {
     possible.then_some(offset)
 }
 
-/// The force -k (n·p - d) n on the origin p of the last moving link's frame where n·p > d, in the world
-/// frame: effort -Jᵀ F. Searched with the normal's azimuth and elevation.
+/// Force -k (n·p - d) n on the origin p of the last moving link's frame if n·p > d, in the world frame: effort -Jᵀ F.
+/// Searched by the normal's azimuth and elevation.
 pub(super) static EFFECT: Effect = Effect {
     name: "contact_wall",
     words: Words::new(
@@ -147,15 +148,15 @@ mod tests {
     fn pushes_back_where_the_link_is_in_the_wall() {
         let robot = TwoJoints::new();
         let site = robot.site_for(PlaceKind::Tool);
-        // A floor at a height of 0.6 m: its normal points down, where it is pressed.
+        // A floor at a height of 0.6 m: its normal points down, the direction of the push.
         let wall = [1000.0, 0.0, 0.0, -1.0, -0.6];
         let coordinates = (EFFECT.to_coordinates)(&wall);
         let mut term = (EFFECT.build)(&site, &coordinates);
-        // Upright the frame of the second joint is at a height of 0.8 m.
+        // In the upright pose the frame of the second joint is at a height of 0.8 m.
         assert_eq!(push(&mut *term, [0.0, 0.0], [0.0; 2], [0.0; 2]), [0.0; 2]);
         let q = 1.3_f64;
         let effort = push(&mut *term, [q, 0.0], [0.0; 2], [0.0; 2]);
-        // The axis is (0, 1, 0.2) scaled to 1; the force is along z, so only x and the y axis count.
+        // The axis is (0, 1, 0.2) scaled to 1; the force is along z, so only x and the y axis matter.
         let axis = Vector3::new(0.0, 1.0, 0.2).normalize();
         let turn = nalgebra::Rotation3::from_scaled_axis(axis * q);
         let lever = turn * Vector3::new(0.0, 0.0, 0.5);

@@ -1,4 +1,4 @@
-//! Dry friction under which a joint creeps in place of standing still.
+//! Dry friction that allows a joint to creep instead of standing still.
 
 use super::law::joint_law;
 use super::{
@@ -6,7 +6,7 @@ use super::{
     Simulated, Traits, Words,
 };
 
-/// Least and largest speed at which the friction is full \[rad/s\].
+/// Smallest and largest speed at which the friction reaches its full value \[rad/s\].
 /// Physical: with `MuJoCo`'s default `solref` and `solimp` about F/(947 M) in steady motion, where M is the inertia that the joint
 /// moves: 0.005 at a shoulder, 0.5 at a light wrist, and a margin.
 const SPEEDS_RAD_S: [f64; 2] = [0.005, 2.0];

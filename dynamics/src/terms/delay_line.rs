@@ -1,29 +1,29 @@
-//! A memory of efforts, from which they come late: of one joint, or of all.
+//! A delay line for the efforts of one joint or of all.
 
 use super::{Effect, MotionSample, Site, Term};
 
-/// How many samples are remembered: enough for a second at 1 kHz.
+/// Number of samples in memory: enough for a second at 1 kHz.
 /// Tuned: from the longest delay and the usual rates; not swept.
 const CAPACITY: usize = 1024;
 
-/// Efforts as they were a while ago, straight between samples. Before the first sample that one is held.
+/// Delayed efforts, linearly interpolated between samples. Before the first sample its value is held.
 #[derive(Debug)]
 pub(super) struct DelayLine {
     delay_s: f64,
     joint_count: usize,
     /// Time since the reset \[s\].
     now_s: f64,
-    /// A ring of times and, joint by joint, of efforts.
+    /// Ring buffer of times and, joint by joint, of efforts.
     times_s: Vec<f64>,
     efforts: Vec<f64>,
-    /// How many were stored since the reset.
+    /// Number of samples stored since the reset.
     stored: usize,
-    /// The oldest that may still be asked for; it only moves on.
+    /// Oldest sample that may still be needed; it only increases.
     oldest: usize,
 }
 
 impl DelayLine {
-    /// One for efforts of so many joints; a delay below zero is none \[s\].
+    /// Creates a line for the efforts of `joint_count` joints; a negative delay is treated as zero \[s\].
     pub(super) fn new(joint_count: usize, delay_s: f64) -> Self {
         Self {
             delay_s: delay_s.max(0.0),
@@ -36,19 +36,19 @@ impl DelayLine {
         }
     }
 
-    /// Changes the delay \[s\]; a delay below zero is none.
+    /// Changes the delay \[s\]; a negative delay is treated as zero.
     pub(super) fn set_delay(&mut self, delay_s: f64) {
         self.delay_s = delay_s.max(0.0);
     }
 
-    /// Forgets what came before.
+    /// Clears the memory.
     pub(super) fn reset(&mut self) {
         self.now_s = 0.0;
         self.stored = 0;
         self.oldest = 0;
     }
 
-    /// Takes the efforts of the next instant, and puts those in their place that were so long ago.
+    /// Stores the efforts of the next instant and replaces them by the delayed ones.
     pub(super) fn pass(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         self.now_s += at.dt_s.max(0.0);
         self.store(effort);
@@ -77,11 +77,11 @@ impl DelayLine {
     }
 
     fn store(&mut self, effort: &[f64]) {
-        // More than fits into the ring within the delay is not stored: what was in between is taken
-        // from the straight line. Of three samples the first and last are at least so far apart.
+        // If more samples fall within the delay than fit into the ring, some are not stored but interpolated
+        // linearly. Of three samples the first and last are at least this far apart.
         let finest_s = 2.0 * self.delay_s / (CAPACITY - 4) as f64;
         let index = match self.stored {
-            // The newest is always kept; it gives way to the next if it came too soon.
+            // The newest sample is always stored; the next one overwrites it if it comes too soon.
             n if n >= 2 && self.now_s - self.time_s(n - 2) < finest_s => n - 1,
             n => {
                 self.stored += 1;
@@ -98,14 +98,14 @@ impl DelayLine {
 #[derive(Debug)]
 pub(super) struct Delayed {
     effect: &'static Effect,
-    /// The joint that comes late; `None` for all.
+    /// The delayed joint; `None` for all.
     joint: Option<usize>,
     values: [f64; 1],
     line: DelayLine,
 }
 
 impl Delayed {
-    /// The term of `effect` for a joint, or for all of the robot of `site`.
+    /// Creates the term of `effect` for a joint, or for all joints of the robot at `site`.
     pub fn boxed(
         effect: &'static Effect,
         site: &Site<'_>,

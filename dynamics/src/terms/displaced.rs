@@ -1,11 +1,11 @@
-//! A robot whose joint is not where it is recorded.
+//! A robot with a joint whose true position differs from the recorded one.
 
 use std::sync::Arc;
 
 use super::MotionSample;
 use crate::{Data, Model, rnea};
 
-/// What a robot costs as it truly moves, less what it would cost as it is recorded.
+/// Difference between the effort of the true motion and that of the recorded motion.
 #[derive(Debug)]
 pub(super) struct Displaced {
     joint: usize,
@@ -14,13 +14,13 @@ pub(super) struct Displaced {
     position: Vec<f64>,
     velocity: Vec<f64>,
     acceleration: Vec<f64>,
-    /// What it costs as recorded, sample by sample, if that is known.
+    /// Effort of the recorded motion, sample by sample, if it was supplied.
     recorded: Option<Arc<Vec<f64>>>,
     sample: usize,
 }
 
 impl Displaced {
-    /// For a robot of which `joint` is elsewhere.
+    /// Creates it for a robot whose joint `joint` is displaced.
     pub fn new(model: &Model, joint: usize) -> Self {
         let zero = vec![0.0; model.dof()];
         Self {
@@ -41,16 +41,16 @@ impl Displaced {
         self.sample = 0;
     }
 
-    /// Passes over a sample at which the joint is where it is recorded.
+    /// Skips a sample at which the joint is at its recorded position.
     pub fn skip(&mut self) {
         self.sample += 1;
     }
 
-    /// Adds to `effort` what the next sample costs more with the joint at this position, velocity and acceleration
+    /// Adds to `effort` the difference at the next sample, with the joint at this position, velocity and acceleration
     /// \[rad, rad/s, rad/s² or m\]. Does not allocate.
     ///
     /// # Panics
-    /// If the efforts that are known end before this sample.
+    /// If the supplied efforts end before this sample.
     pub fn act(&mut self, at: &MotionSample<'_>, [q, qd, qdd]: [f64; 3], effort: &mut [f64]) {
         self.position.copy_from_slice(at.position);
         self.velocity.copy_from_slice(at.velocity);

@@ -1,5 +1,5 @@
-//! A drive that loses what is asked of it around zero, as a bridge does whose dead time is not compensated (G. Tao and
-//! P. V. Kokotović, *Adaptive Control of Systems with Actuator and Sensor Nonlinearities*, 1996, chapter 2: dead zone).
+//! A drive with a dead zone around zero torque, like a bridge without dead-time compensation (G. Tao and P. V.
+//! Kokotović, *Adaptive Control of Systems with Actuator and Sensor Nonlinearities*, 1996, chapter 2: dead zone).
 
 use super::law::array;
 use super::{
@@ -7,16 +7,17 @@ use super::{
     Scale, Simulated, Term, Traits, Words,
 };
 
-/// The edge of the band is rounded over this share of it: ripple and noise of the current dither it, and a fit needs a slope.
+/// Share of the band over which its edge is rounded: ripple and noise of the current dither it, and a fit needs a
+/// finite slope.
 /// Tuned: by the slope that it leaves, 4 at most; not swept.
 const ROUNDED: f64 = 0.25;
 
-/// A narrower band does nothing \[N m or N\].
+/// Narrowest band \[N m or N\].
 /// Resolution: keeps a quotient finite; far below any effort.
 const NARROWEST: f64 = 1e-12;
 
-/// Recorded effort: τ + d sgn(τ), for the drive delivers τ of it and loses d. Unlike friction it turns with the effort, not
-/// with the motion.
+/// Recorded effort: τ + d sgn(τ), because the drive delivers τ and loses d. Unlike friction it changes its sign with
+/// the effort, not with the motion.
 pub(super) static EFFECT: Effect = Effect {
     name: "drive_deadband",
     words: Words::new(

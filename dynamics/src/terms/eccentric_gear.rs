@@ -1,5 +1,5 @@
-//! Friction that goes up and down with the angle: a gear or bearing off centre, a bent shaft, a seal that rubs at one side
-//! (B. Armstrong-Hélouvry, *Control of Machines with Friction*, 1991, position-dependent friction).
+//! Friction that varies periodically with the angle: a gear or bearing off centre, a bent shaft, a seal that rubs at
+//! one side (B. Armstrong-Hélouvry, *Control of Machines with Friction*, 1991, position-dependent friction).
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! What there is to know of a term without its numbers.
+//! Static description of an effect: name, place, parameters, limits, wording.
 
 use super::concealed::{Draw, Drawn};
 use super::export::Exported;
@@ -11,49 +11,50 @@ mod tests;
 
 pub use parameter::{Coordinate, CoordinateKind, Parameter, Scale};
 
-/// What there is to know of a term without its numbers. Nobody else asks what is true of an effect of a certain name: what is
-/// known of it stands here, in the term's own file.
+/// Static description of an effect. All properties of an effect are defined in its own file; no other code tests for
+/// the name of an effect.
 #[derive(Debug)]
 pub struct Effect {
     /// Canonical name.
     pub name: &'static str,
-    /// What a report says of it.
+    /// Wording in reports.
     pub words: Words,
-    /// What kind of physics it is.
+    /// Kind of physics.
     pub family: Family,
-    /// What kind of place it is in.
+    /// Kind of place.
     pub place: PlaceKind,
-    /// Where in the chain from motion to recorded effort it acts.
+    /// Stage of the chain from motion to recorded effort at which it acts.
     pub layer: Layer,
-    /// Logarithm of the prior odds that it is met at one place of an arm \[nats\]: next to nothing for friction, -3 for what is
-    /// met now and then (a payload, a torque constant), -4 for what is met seldom, -5 for what happens once, and -7 for what
-    /// few have met. Chosen: by order of magnitude; no survey was counted.
+    /// Logarithm of its prior odds at one place of an arm \[nats\]: about 0 for friction, -3 for an occasional effect
+    /// (a payload, a torque constant), -4 for a rare one, -5 for a single event, and -7 for a very rare effect.
+    /// Chosen: by order of magnitude; no survey was counted.
     pub odds_nats: f64,
-    /// Its parameters as files and reports hold them.
+    /// Parameters in files and reports.
     pub parameters: &'static [Parameter],
-    /// What a fit searches in; the order of the values that `build` takes.
+    /// Coordinates that a fit searches; the order of the values that `build` takes.
     pub coordinates: &'static [Coordinate],
-    /// Parameters, in their order, from coordinates.
+    /// Computes the parameters, in their order, from coordinates.
     pub to_parameters: fn(&[f64]) -> Vec<f64>,
-    /// Coordinates, in their order, from parameters.
+    /// Computes the coordinates, in their order, from parameters.
     pub to_coordinates: fn(&[f64]) -> Vec<f64>,
     /// The simpler effect that it contains; `None` if it contains none.
     pub simpler: Option<Simpler>,
-    /// The motion that shows it.
+    /// Motion that excites it.
     pub excitation: Excitation,
     /// Its form in a simulator's model.
     pub exported: Exported,
-    /// How a simulated arm suffers it.
+    /// Form in the simulated arm.
     pub simulated: Simulated,
-    /// Draws one at random, to be concealed; `None` for what only describes. Its `sizes` change some effort the more the larger.
+    /// Draws a random instance to conceal; `None` for purely descriptive effects. A larger one of its `sizes` changes
+    /// some effort more.
     pub concealed: Option<fn(&mut Draw<'_>) -> Option<Drawn>>,
-    /// What is true of a few effects only.
+    /// Properties of only a few effects.
     pub traits: Traits,
-    /// Makes the term at a site from its coordinates.
+    /// Builds the term at a site from its coordinates.
     pub build: fn(&Site<'_>, &[f64]) -> Box<dyn Term>,
 }
 
-/// There is but one effect of a name.
+/// Names are unique.
 impl PartialEq for Effect {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
@@ -61,7 +62,7 @@ impl PartialEq for Effect {
 }
 
 impl Effect {
-    /// When it acts.
+    /// Time during which it acts.
     pub fn time(&self) -> Time {
         let count = |kind| self.coordinates.iter().filter(|c| c.kind == kind).count();
         match (
@@ -75,12 +76,12 @@ impl Effect {
         }
     }
 
-    /// Whether it is something stiff in space that the arm meets.
+    /// Whether it is a stiff surface in space that the arm touches.
     pub fn is_surface(&self) -> bool {
         self.family == Family::Contact && self.time() == Time::Always
     }
 
-    /// Whether it is part of the arm, not something that comes and goes.
+    /// Whether it is a lasting property of the arm, not a temporary event.
     pub fn lasts(&self) -> bool {
         matches!(self.time(), Time::Always | Time::Step) && self.family != Family::Contact
     }
@@ -90,17 +91,18 @@ impl Effect {
         self.family == Family::PlainFriction
     }
 
-    /// Whether a twin may hold more of it than there is, so that a correction takes some of it away.
+    /// Whether a twin may contain too much of it, so that a correction reduces it.
     pub fn may_be_overstated(&self) -> bool {
         self.is_plain_friction() || self.traits.may_be_overstated
     }
 
-    /// Whether it splits its joint in rotor and link.
+    /// Whether it splits its joint into rotor and link.
     pub fn splits_joint(&self) -> bool {
         matches!(self.simulated, Simulated::Transmission(_))
     }
 
-    /// What it is called in reports: what only describes, and what the list of canonical names lacks, is `unknown`.
+    /// Name in reports: `unknown` for purely descriptive effects and for those that are not in the list of canonical
+    /// names.
     pub fn said(&self) -> &'static str {
         if self.traits.describes_only || self.traits.is_off_list {
             UNKNOWN.name
@@ -110,10 +112,11 @@ impl Effect {
     }
 }
 
-/// What kind of physics an effect is.
+/// Kind of physics of an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Family {
-    /// Coulomb and viscous friction: a curve of friction goes with them, and there may be less of them than a twin says.
+    /// Coulomb and viscous friction. A curve of friction is searched together with them, and a twin may contain too
+    /// much of them.
     PlainFriction,
     /// Other friction.
     Friction,
@@ -121,49 +124,50 @@ pub enum Family {
     Spring,
     /// Rotor and gear.
     Transmission,
-    /// Inertia of links and of what they carry.
+    /// Inertia of links and of their loads.
     Body,
-    /// How the arm stands.
+    /// Mounting of the arm.
     Mounting,
-    /// Forces from outside.
+    /// External forces.
     Contact,
-    /// What the drive or its sensor reports.
+    /// Report of the drive or its sensor.
     Recording,
-    /// No name fits.
+    /// No effect of the library fits.
     Unnamed,
 }
 
-/// When an effect acts.
+/// Time during which an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Time {
     /// All the time.
     Always,
     /// It changes once in a session.
     Step,
-    /// For an interval of every recording.
+    /// During an interval of every recording.
     EveryRecording,
-    /// For an interval of the session.
+    /// During an interval of the session.
     Once,
 }
 
-/// The motion that shows an effect, those that tell it from the most others last.
+/// Motion that excites an effect; those that distinguish it from the most other effects come last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Excitation {
-    /// Every speed in both directions, from creeping on.
+    /// All speeds in both directions, including very low ones.
     Speeds,
     /// The whole range of the joint, slowly.
     WholeRange,
-    /// Gravity from all sides, and effort of all sizes.
+    /// Gravity from all directions, and effort of all sizes.
     Poses,
     /// Fast reversals.
     Fast,
 }
 
 impl Excitation {
-    /// The motion that tells an effect from another.
+    /// Motion that distinguishes two effects.
     #[must_use]
     pub fn between(self, other: Self) -> Self {
-        // What every pose or fast reversals show is told from all else by them; a function of position is told from friction by speeds.
+        // Poses and fast reversals distinguish their effects from all others; speeds distinguish functions of
+        // position from friction.
         match self.max(other) {
             most @ (Self::Poses | Self::Fast) => most,
             _ => self.min(other),
@@ -171,95 +175,99 @@ impl Excitation {
     }
 }
 
-/// A simpler effect that one contains: it has a single number.
+/// A simpler effect with a single parameter that an effect contains.
 #[derive(Debug, Clone, Copy)]
 pub struct Simpler {
-    /// The simpler one.
+    /// The simpler effect.
     pub effect: &'static Effect,
-    /// The parameters that grow as its number does. Of one that changes once, what it is afterwards comes first.
+    /// Parameters that correspond to the parameter of the simpler effect. For an effect that changes once, the value
+    /// after the change comes first.
     pub numbers: &'static [&'static str],
 }
 
-/// How a simulated arm suffers an effect.
+/// Form of an effect in the simulated arm.
 #[derive(Debug, Clone, Copy)]
 pub enum Simulated {
-    /// Its bodies or gravity are others: [`Term::alter`].
+    /// Changed bodies or gravity: [`Term::alter`].
     Model,
-    /// It carries the body of the first ten coordinates between the times of the last two.
+    /// A body of the first ten coordinates, carried between the times of the last two.
     CarriedForAWhile,
-    /// A force from outside, where the links are.
+    /// An external force at the present pose of the links.
     Load,
-    /// Beside the effort in the joint, on the motor's side.
+    /// An additional effort in the joint, on the motor's side.
     Joint,
-    /// What comes through between rotor and link, given coordinates and the inertia that the joint moves \[kg m²\]; the
-    /// second parameter is the rotor's inertia.
+    /// Compliance between rotor and link, from coordinates and the inertia that the joint moves \[kg m²\]; the second
+    /// parameter is the rotor's inertia.
     Transmission(fn(&[f64], f64) -> Compliance),
-    /// In what is recorded.
+    /// A change of the recorded effort.
     Record,
-    /// Not at all, and why.
+    /// Not simulated, with the reason.
     No(&'static str),
 }
 
-/// What is between the rotor and the link of a joint.
+/// Compliance between the rotor and the link of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Compliance {
-    /// \[N m/rad\]
+    /// Stiffness \[N m/rad\].
     pub stiffness: f64,
-    /// \[N m s/rad\]
+    /// Damping \[N m s/rad\].
     pub damping: f64,
-    /// Half the width of the play between them \[rad\]. With play a contact pushes and never pulls.
+    /// Half the width of the gap between them \[rad\]. With a gap, a contact pushes and never pulls.
     pub half_gap: Option<f64>,
 }
 
-/// What is true of a few effects only.
+/// Properties of only a few effects.
 #[derive(Debug, Clone, Copy)]
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is a fact of its own, told by name in the few files that give it"
 )]
 pub struct Traits {
-    /// How many of it there may be at one place.
+    /// Largest number of instances at one place.
     pub most_at_one_place: usize,
-    /// Where two at one place are said as one finding: the names of the second one's parameters.
+    /// Names of the second instance's parameters, if two at one place are reported as one finding.
     pub second: &'static [&'static str],
-    /// It depends on what the gear transmits.
+    /// It depends on the effort that the gear transmits.
     pub needs_load: bool,
-    /// It happens within the fastest of the motion, around reversals or in the spring of a gear, which smoothing blurs.
+    /// It acts in the fastest part of the motion, around reversals or in the spring of a gear, which smoothing blurs.
     pub is_fast: bool,
     /// A term of [`Layer::Record`] that only adds.
     pub only_adds: bool,
-    /// It is plain dry friction with the opposite sign.
+    /// It is Coulomb friction with the opposite sign.
     pub negates_friction: bool,
     /// It only shifts effort or position in time.
     pub shifts_time: bool,
-    /// It cuts the effort off at a limit, of a sensor or of a drive: a finding says of which.
+    /// It limits the effort, as a sensor's or a drive's range does; a finding names the limited one.
     pub cuts_off: bool,
-    /// It multiplies all effort of a joint: where nobody knows the joint's scale, it says nothing.
+    /// It multiplies the whole effort of a joint: without a known scale of the joint it carries no information.
     pub is_scale: bool,
-    /// It describes what has no name.
+    /// It describes a residual without a known cause.
     pub describes_only: bool,
-    /// It has a law and a name here, but the list of names that reports may use lacks it. A finding is an `unknown` whose
-    /// parameter `kind` is this name, so that who reads reports by that list sees an honest `unknown` with numbers.
+    /// It has a law and a name here, but is not in the list of names that reports may use. A finding is an `unknown`
+    /// with this name in the parameter `kind`, so that readers of the standard list see an `unknown` with its
+    /// parameters.
     pub is_off_list: bool,
-    /// The number of its simpler effect, from its coordinates and a time of the session \[s\], if that changes all the time.
-    /// Its coordinates are that number at the start of the session and its growth.
+    /// Parameter of its simpler effect, from its coordinates and a time of the session \[s\], if it changes
+    /// continuously. Its coordinates are this parameter at the start of the session and its growth.
     pub drifts: Option<fn(&[f64], f64) -> f64>,
-    /// Its effort is linear in its factors to first order only, so it is computed anew for each of their values.
+    /// Its effort is linear in its factors to first order only, so it is recomputed for each of their values.
     pub bends: bool,
-    /// It acts through the whole of one recording: its two times are those of a recording's ends.
+    /// It acts during one whole recording: its two times are the ends of a recording.
     pub fills_recording: bool,
-    /// It acts from the start of the session to some time, or from some time to its end, in several recordings perhaps.
+    /// It acts from the start of the session to some time, or from some time to its end, possibly over several
+    /// recordings.
     pub in_session: bool,
-    /// Robot files and twins hold it, and perhaps too much of it.
+    /// Robot files and twins contain it, possibly too much of it.
     pub may_be_overstated: bool,
-    /// It is estimated every night, whether it is there or not, and followed over weeks.
+    /// It is estimated every night, whether present or not, and followed over weeks.
     pub is_followed: bool,
-    /// What the smallest size that would have been found is told as: its first factor. `None` if that does not make it.
+    /// Parameter in which the detection limit is reported: its first factor. `None` if this factor does not make the
+    /// effect.
     pub smallest_told_as: Option<&'static str>,
 }
 
 impl Traits {
-    /// Nothing of all that.
+    /// No special property.
     pub const NONE: Self = Self {
         most_at_one_place: 1,
         second: &[],
@@ -282,16 +290,16 @@ impl Traits {
     };
 }
 
-/// What kind of place an effect is in.
+/// Kind of place of an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlaceKind {
     /// One joint.
     Joint,
-    /// One joint, and another that it is driven by ([`Site::source`]).
+    /// One joint, and a second one that drives it ([`Site::source`]).
     TwoJoints,
     /// A moving link.
     Link,
-    /// What is held or touched at the end of the arm: the tool link.
+    /// The tool link, at the end of the arm.
     Tool,
     /// The base link.
     Base,
@@ -299,14 +307,14 @@ pub enum PlaceKind {
     All,
 }
 
-/// Where in the chain from motion to recorded effort a term acts. Within a layer the order is that of
-/// the list of terms.
+/// Stage of the chain from motion to recorded effort at which a term acts. Within a layer the order is that of the
+/// list of terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Layer {
-    /// It changes what the bodies cost: payload, tilt, elasticity, external forces. Adds to the effort.
+    /// Changes the effort of the bodies: payload, tilt, elasticity, external forces. Adds to the effort.
     Body,
-    /// It acts at a joint beside the transmitted effort: friction, springs, rotor inertia. Adds.
+    /// Acts at a joint, in addition to the transmitted effort: friction, springs, rotor inertia. Adds.
     Joint,
-    /// It changes what is recorded: gain, bias, delay. Transforms all that came before it.
+    /// Changes the recorded effort: gain, bias, delay. Transforms the effort of all preceding terms.
     Record,
 }

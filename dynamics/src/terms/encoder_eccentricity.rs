@@ -1,5 +1,5 @@
-//! An encoder off centre: its error comes back once or twice per revolution. B. W. Mooring, Z. S. Roth and M. R. Driels,
-//! *Fundamentals of Manipulator Calibration*, 1991, count it among the non-geometric errors of a joint.
+//! An encoder off centre: its error repeats once or twice per revolution. B. W. Mooring, Z. S. Roth and M. R. Driels,
+//! *Fundamentals of Manipulator Calibration*, 1991, list it among the non-geometric errors of a joint.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -11,8 +11,9 @@ use super::{
     Scale, Simulated, Term, Traits, Words, wave,
 };
 
-/// The joint stands at the recorded position q plus A sin(n q + φ), and moves accordingly: the effort of the robot there less
-/// that of the recorded motion. To first order linear in the factors of sin n q and cos n q.
+/// The true motion of the joint is the recorded position q plus A sin(n q + φ) and its derivatives. The effort of
+/// this effect is that of the true motion minus that of the recorded motion. To first order linear in the factors of
+/// sin n q and cos n q.
 pub(super) static EFFECT: Effect = Effect {
     name: "encoder_eccentricity",
     words: Words::new(
@@ -78,7 +79,7 @@ struct EncoderEccentricity {
 }
 
 impl EncoderEccentricity {
-    /// Position, velocity and acceleration of the joint as it truly moves.
+    /// True position, velocity and acceleration of the joint.
     fn truly(&self, at: &MotionSample<'_>) -> [f64; 3] {
         let j = self.joint;
         let [sine, cosine, n] = self.values;
@@ -130,7 +131,7 @@ mod tests {
         let mut term = (EFFECT.build)(&robot.site(), &[0.02, -0.01, 1.0]);
         let off = |q: f64| 0.02 * q.sin() - 0.01 * q.cos();
         for (at, added) in motion.iter().zip(run(&mut *term, &motion)) {
-            // The recorded motion as a short path, whose true path is differenced.
+            // The recorded motion over a short time; the true motion is differentiated numerically.
             let path = |t: f64| {
                 let q = at.position[0] + at.velocity[0] * t + 0.5 * at.acceleration[0] * t * t;
                 q + off(q)

@@ -1,16 +1,18 @@
-//! What bodies cost near a motion, as one joint's link leaves it.
+//! Expansion of the rigid body's effort about a motion, for a deviation of one joint's link.
 
 use crate::{Data, Model, rnea};
 
-/// Steps of the difference quotients: position \[rad or m\]; effort is quadratic in velocity and linear in acceleration.
+/// Step of the difference quotients in position \[rad or m\]; the effort is quadratic in velocity and linear in
+/// acceleration.
 /// Physical: the error of a central difference, some 1e-6 of the effort, is below that of any recording.
 const POSITION_STEP: f64 = 1e-3;
-/// Numbers per joint and sample: the effort, by position once and twice, by velocity, by acceleration.
+/// Values per joint and sample: the effort, its first and second derivative by position, and those by velocity and
+/// acceleration.
 const ORDERS: usize = 5;
 
-/// The rigid body's effort at all joints along a motion, to second order in a deviation of one joint's position and to
-/// first order in those of its velocity and acceleration. Whoever tries many transmissions on one motion computes it
-/// once and gives it to each with [`super::Term::expand`]: that spares inverse dynamics.
+/// Effort of the rigid body at all joints along a motion, to second order in a deviation of one joint's position and
+/// to first order in those of its velocity and acceleration. It is computed once per motion and given to each of many
+/// trial transmissions by [`super::Term::expand`], which saves inverse dynamics.
 #[derive(Debug, Clone)]
 pub struct Expansion {
     joint: usize,
@@ -19,7 +21,7 @@ pub struct Expansion {
 }
 
 impl Expansion {
-    /// For deviations of `joint` of a robot, at first along no motion.
+    /// Creates an expansion for deviations of `joint`, with an empty motion.
     pub fn new(model: &Model, joint: usize) -> Self {
         Self {
             joint,
@@ -31,7 +33,7 @@ impl Expansion {
     /// Adds the next sample of the motion: position, velocity and acceleration of all joints.
     ///
     /// # Panics
-    /// If a slice is not one number per joint of `model`.
+    /// If a slice does not have one value per joint of `model`.
     pub fn push(&mut self, model: &Model, data: &mut Data, q: &[f64], qd: &[f64], qdd: &[f64]) {
         let j = self.joint;
         let (mut moved_q, mut moved_qd, mut moved_qdd) = (q.to_vec(), qd.to_vec(), qdd.to_vec());
@@ -58,7 +60,7 @@ impl Expansion {
         }
     }
 
-    /// Writes the effort at sample `k` with the joint off by these \[rad, rad/s, rad/s² or m\].
+    /// Writes the effort at sample `k` for this deviation of the joint \[rad, rad/s, rad/s² or m\].
     pub(super) fn effort(&self, k: usize, [q, qd, qdd]: [f64; 3], into: &mut [f64]) {
         let row = &self.numbers[k * ORDERS * self.joints..(k + 1) * ORDERS * self.joints];
         for (into, orders) in into.iter_mut().zip(row.as_chunks::<ORDERS>().0) {

@@ -1,4 +1,4 @@
-//! Effects in simulators' models.
+//! Form of effects in simulators' models.
 
 use super::{Effect, TermSpec};
 
@@ -15,12 +15,12 @@ pub enum Quantity {
     Armature(f64),
     /// A spring.
     Spring {
-        /// \[N m/rad or N/m\]
+        /// Stiffness \[N m/rad or N/m\].
         stiffness: f64,
         /// Position without force \[rad or m\].
         rest: f64,
     },
-    /// Error of the joint's zero \[rad or m\]: where the encoder reads q, the joint is at q + this.
+    /// Error of the joint's zero \[rad or m\]: if the encoder reads q, the joint is at q + this.
     Zero(f64),
     /// A body's mass, centre of mass and inertia ([`super::Term::inertia`]).
     Body,
@@ -31,26 +31,26 @@ pub enum Quantity {
 /// The form of an effect in a simulator's model.
 #[derive(Debug, Clone, Copy)]
 pub enum Exported {
-    /// By these quantities, from its parameters.
+    /// Exactly by these quantities, from its parameters.
     As(fn(&[f64]) -> Vec<Quantity>),
-    /// Nearest by these quantities; the sentence says what is lost.
+    /// Approximately by these quantities; the sentence states the loss.
     Nearest(fn(&[f64]) -> Vec<Quantity>, &'static str),
-    /// Not at all, and why.
+    /// Not exported, with the reason.
     No(&'static str),
 }
 
-/// Reason of effects that are no part of an arm.
+/// Reason for effects of the recording.
 pub const OF_RECORDING: &str = "it is in what is recorded, not in the arm: mend the recording";
-/// Reason of what comes and goes.
+/// Reason for temporary effects.
 pub const PASSES: &str = "it comes and goes: it belongs to a scenario, not to the model";
-/// Reason of what changes once or steadily.
+/// Reason for effects that change once or continuously.
 pub const CHANGES: &str = "it changes in time; twin.yaml has what is left of it now as a simpler effect, which is written";
 
 impl Effect {
-    /// The quantities of a term of this effect, and what they lose.
+    /// The quantities of a term of this effect, and the loss of an approximation.
     ///
     /// # Errors
-    /// The reason why no simulator says it.
+    /// The reason why no simulator has a matching quantity.
     pub fn quantities(
         &self,
         spec: &TermSpec,

@@ -1,4 +1,4 @@
-//! Somebody or something that pushes the arm for a while.
+//! A temporary external force on the arm.
 
 use nalgebra::Vector3;
 
@@ -16,13 +16,13 @@ pub(super) static EFFECT: Effect = Effect {
     name: "external_push",
     words: Words {
         without_numbers: Some(
-            "Something pushed link {place} or one further out: how hard, and where on it, a force at the link's frame cannot say.",
+            "Something pushed link {place} or a link further out. The recordings determine neither the force nor its point of action.",
         ),
         ..Words::new(
             "External push",
             "a push from outside",
             "Something or somebody pushed the arm for a while.",
-            "Who or what touched the arm at link {place} then?",
+            "Link {place}: find out what touched the arm at that time.",
             "Something pushed link {place} with ({force_x_n}, {force_y_n}, {force_z_n}).",
         )
     },
@@ -122,13 +122,13 @@ impl AtLink {
         }
     }
 
-    /// Goes where the link is now, and gives its origin in the world \[m\].
+    /// Computes the link's pose and returns its origin in the world \[m\].
     pub fn place(&mut self, position: &[f64]) -> Vector3<f64> {
         forward_kinematics(&self.model, &mut self.data, position);
         link_origin(&self.model, &self.data, self.link)
     }
 
-    /// Adds the effort that it takes to hold against `force_n`.
+    /// Adds the effort that balances `force_n`.
     pub fn resist(&mut self, force_n: &Vector3<f64>, effort: &mut [f64]) {
         let jacobian = link_jacobian(&self.model, &mut self.data, self.link);
         for (effort, column) in effort.iter_mut().zip(jacobian.column_iter()) {

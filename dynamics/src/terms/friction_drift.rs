@@ -1,7 +1,7 @@
-//! Coulomb friction that grows or falls steadily through a session, as that of a joint does which warms up, or in which a
-//! part begins to bind. How friction goes with temperature: A. C. Bittencourt and S. Gunnarsson, "Static Friction in a Robot
-//! Joint: Modeling and Identification of Load and Temperature Effects", *Journal of Dynamic Systems, Measurement, and
-//! Control* 134(5), 2012; at its start, warming up is linear in time.
+//! Coulomb friction that grows or falls steadily during a session, as in a joint that warms up or a part that begins
+//! to bind. For the dependence of friction on temperature see A. C. Bittencourt and S. Gunnarsson, "Static Friction
+//! in a Robot Joint: Modeling and Identification of Load and Temperature Effects", *Journal of Dynamic Systems,
+//! Measurement, and Control* 134(5), 2012; at its start, warming up is linear in time.
 
 use super::law::joint_law;
 use super::{
@@ -66,7 +66,7 @@ pub(super) static EFFECT: Effect = Effect {
     },
 };
 
-/// Its Coulomb friction at a time of the session \[N m or N\].
+/// Coulomb friction at a time of the session \[N m or N\].
 fn at_session(coordinates: &[f64], session_s: f64) -> f64 {
     let [start, growth] = super::law::array(coordinates);
     start + growth * session_s

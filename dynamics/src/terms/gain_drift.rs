@@ -73,7 +73,7 @@ fn at_session(coordinates: &[f64], session_s: f64) -> f64 {
 #[derive(Debug)]
 struct GainDrift {
     joint: usize,
-    /// Gain at the start of the session, less 1, and its growth \[1/s\].
+    /// Gain at the start of the session, minus 1, and its growth \[1/s\].
     values: [f64; 2],
 }
 

@@ -1,5 +1,6 @@
-//! A torque constant that varies with the angle: magnets of unequal strength, a bent shaft in its stator, a torque sensor whose
-//! bridge feels the angle. J. R. Hendershot and T. J. E. Miller, *Design of Brushless Permanent-Magnet Machines*, 2010.
+//! A torque constant that varies with the angle: magnets of unequal strength, a bent shaft in its stator, a torque
+//! sensor whose bridge is sensitive to the angle. J. R. Hendershot and T. J. E. Miller, *Design of Brushless
+//! Permanent-Magnet Machines*, 2010.
 
 use std::f64::consts::PI;
 

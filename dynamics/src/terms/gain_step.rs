@@ -1,5 +1,5 @@
-//! A torque constant or a sensor's scale that jumps once: a winding that burns through, magnets that were too hot, a drive that
-//! was set up anew.
+//! A torque constant or a sensor's scale that jumps once: a burnt winding, overheated magnets, a drive that was
+//! reconfigured.
 
 use super::law::array;
 use super::payload_pickup::time;
@@ -60,7 +60,7 @@ pub(super) static EFFECT: Effect = Effect {
 #[derive(Debug)]
 struct GainStep {
     joint: usize,
-    /// Gain before and after, less 1, and when it jumps \[s from the start of the session\].
+    /// Gain before and after the jump, minus 1, and time of the jump \[s from the start of the session\].
     values: [f64; 3],
 }
 

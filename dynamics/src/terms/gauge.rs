@@ -1,31 +1,31 @@
-//! What a curve is drawn against, read sample by sample.
+//! The argument of a curve, computed sample by sample.
 
 use super::{Against, MotionSample, sign};
 
-/// A joint that stays below this is at rest \[rad/s or m/s\].
+/// Speed below which a joint is at rest \[rad/s or m/s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const REST_RAD_S: f64 = 0.01;
-/// For so long at least \[s\]: a joint that reverses does not rest.
+/// Shortest standstill that counts as rest \[s\]; a reversal is shorter.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_REST_S: f64 = 0.1;
 
-/// A joint of which nothing is known yet has moved for so long \[s\].
+/// Initial time since the last rest, before any rest was observed \[s\].
 /// Physical: longer than any recording.
 const LONG_S: f64 = 1e7;
-/// And so far \[rad or m\].
+/// Initial travel since the last reversal \[rad or m\].
 /// Physical: farther than any joint moves in one direction.
 const FAR: f64 = 1e7;
 
-/// Reads what a curve is drawn against, sample by sample.
+/// Computes the argument of a curve, sample by sample.
 #[derive(Debug, Clone)]
 pub struct Gauge {
     against: Against,
     joint: usize,
-    /// Largest reading of [`Against::LoadTurned`] to either side.
+    /// Largest absolute value of [`Against::LoadTurned`].
     band: f64,
     rested_s: f64,
     moved_s: f64,
-    /// Direction of the newest motion, and how far it has led \[rad or m\].
+    /// Direction of the present motion, and the distance travelled in it \[rad or m\].
     direction: f64,
     travel: f64,
     turned: f64,
@@ -33,8 +33,8 @@ pub struct Gauge {
 }
 
 impl Gauge {
-    /// One for the joint of index `joint`. `band` is the largest reading of [`Against::LoadTurned`] to either side
-    /// \[N m or N\].
+    /// Creates a gauge for the joint of index `joint`. `band` is the largest absolute value of
+    /// [`Against::LoadTurned`] \[N m or N\].
     pub fn new(against: Against, joint: usize, band: f64) -> Self {
         Self {
             against,
@@ -49,12 +49,12 @@ impl Gauge {
         }
     }
 
-    /// Forgets what came before. A joint then counts as long in motion, and its load as half turned.
+    /// Clears the state. The joint is then treated as long in motion, and its load as half reversed.
     pub fn reset(&mut self) {
         *self = Self::new(self.against, self.joint, self.band);
     }
 
-    /// The reading at the next instant.
+    /// Returns the argument at the next instant.
     pub fn read(&mut self, at: &MotionSample<'_>) -> f64 {
         let joint = self.joint;
         match self.against {
@@ -102,7 +102,7 @@ impl Gauge {
     }
 }
 
-/// Velocity of the joint after `joint` in the URDF; 0 behind the last one.
+/// Velocity of the joint after `joint` in the URDF; 0 for the last one.
 fn next(at: &MotionSample<'_>, joint: usize) -> f64 {
     at.velocity.get(joint + 1).copied().unwrap_or(0.0)
 }
@@ -113,7 +113,7 @@ impl Against {
         matches!(self, Self::Load | Self::DrivenLoad | Self::LoadTurned)
     }
 
-    /// Whether it is the time since a start that another run does not share.
+    /// Whether it is a time since a start that differs between runs.
     pub fn is_of_start(self) -> bool {
         matches!(self, Self::RecordingTime | Self::SessionTime)
     }
@@ -123,7 +123,7 @@ impl Against {
 mod tests {
     use super::*;
 
-    /// Readings for the second joint of a robot at these velocities and loads, every 0.05 s.
+    /// Arguments for the second joint of a robot at these velocities and loads, every 0.05 s.
     fn readings(against: Against, motion: &[(f64, f64)]) -> Vec<f64> {
         let mut gauge = Gauge::new(against, 1, 1.0);
         let read = |&(velocity, load): &(f64, f64)| {

@@ -1,12 +1,12 @@
-//! Bodies on top of those of the robot, and what they alone cost.
+//! Bodies added to those of the robot, and their effort alone.
 
 use super::{Effect, MotionSample, Site, Term};
 use crate::{Data, Inertia, Model, rnea};
 
-/// When something is there.
+/// Time during which a body is present.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum While {
-    /// For good.
+    /// Permanently.
     Always,
     /// Between two times of each recording \[s from its start\].
     InEachRecording([f64; 2]),
@@ -15,7 +15,7 @@ pub(super) enum While {
 }
 
 impl While {
-    /// Share of a sample in which it is there, 0 to 1.
+    /// Share of a sample during which it is present, 0 to 1.
     pub fn share(self, at: &MotionSample<'_>) -> f64 {
         let (now_s, [start_s, end_s]) = match self {
             Self::Always => return 1.0,
@@ -26,8 +26,8 @@ impl While {
     }
 }
 
-/// An inertia at a link, for good or for a while. The cost of bodies is linear in their inertias, so a
-/// robot that is weightless but for this one gives it.
+/// An inertia at a link, permanent or temporary. The effort of bodies is linear in their inertias, so it is computed
+/// with a robot that is massless except for this one.
 #[derive(Debug)]
 pub(super) struct Ghost {
     effect: &'static Effect,

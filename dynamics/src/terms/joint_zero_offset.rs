@@ -1,5 +1,5 @@
-//! A joint whose zero is not the model's: B. W. Mooring, Z. S. Roth and M. R. Driels, *Fundamentals of Manipulator
-//! Calibration*, 1991.
+//! A joint whose zero differs from the model: B. W. Mooring, Z. S. Roth and M. R. Driels, *Fundamentals of
+//! Manipulator Calibration*, 1991.
 
 use std::sync::Arc;
 
@@ -11,8 +11,8 @@ use super::{
 };
 use crate::Model;
 
-/// The joint stands at the recorded position plus the offset: the effort of the robot there less that at the recorded
-/// position. To first order linear in the offset.
+/// The true position of the joint is the recorded one plus the offset. The effort of this effect is that at the true
+/// position minus that at the recorded position. To first order linear in the offset.
 pub(super) static EFFECT: Effect = Effect {
     name: "joint_zero_offset",
     words: Words::new(
@@ -48,7 +48,7 @@ pub(super) static EFFECT: Effect = Effect {
     build: |site, values| JointZeroOffset::boxed(&EFFECT, site, values, While::Always),
 };
 
-/// An offset by the first of its coordinates, for good or for a while.
+/// An offset by the first of its coordinates, permanent or temporary.
 #[derive(Debug)]
 pub(super) struct JointZeroOffset {
     effect: &'static Effect,

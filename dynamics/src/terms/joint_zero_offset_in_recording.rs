@@ -1,4 +1,4 @@
-//! A joint whose zero is another one in one recording than in the others.
+//! A joint whose zero differs in one recording from that in the others.
 
 use super::ghost::While;
 use super::joint_zero_offset::JointZeroOffset;

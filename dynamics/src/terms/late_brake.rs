@@ -1,5 +1,5 @@
-//! A holding brake that lets go late: its coil has to build up a field before the armature lifts off, and until then the joint
-//! drags it along (VDI 2241 part 1, *Switch-operated clutches and brakes*, 1982: separation time).
+//! A holding brake that releases late: its coil must build up a field before the armature lifts off, and until then
+//! the joint drags the brake (VDI 2241 part 1, *Switch-operated clutches and brakes*, 1982: separation time).
 
 use super::gauge::Gauge;
 use super::law::array;
@@ -8,8 +8,8 @@ use super::{
     PlaceKind, Scale, Simulated, Site, Term, Traits, Words, sign,
 };
 
-/// Effort F exp(-(t / T)⁸) sgn(qd), t being the time since the joint last stood still: all of F until shortly before T, then
-/// nothing: an armature that has come loose lifts off at once.
+/// Effort F exp(-(t / T)⁸) sgn(qd), where t is the time since the joint was last at rest: all of F until shortly
+/// before T, then nothing, because a released armature lifts off at once.
 pub(super) static EFFECT: Effect = Effect {
     name: "late_brake",
     words: Words::new(
@@ -50,7 +50,7 @@ pub(super) static EFFECT: Effect = Effect {
     build: |site, values| Box::new(LateBrake::new(site, array(values))),
 };
 
-/// No brake is faster \[s\].
+/// Shortest release time of a brake \[s\].
 /// Resolution: keeps a quotient finite; far below a sample.
 const FASTEST_S: f64 = 1e-6;
 
@@ -96,7 +96,7 @@ mod tests {
     use super::super::tests::{TwoJoints, sample};
     use super::*;
 
-    /// Efforts of the first joint, which stands for a second and then moves, every 0.01 s.
+    /// Efforts of the first joint, which rests for a second and then moves, every 0.01 s.
     fn efforts(values: &[f64], velocity: f64) -> Vec<f64> {
         let robot = TwoJoints::new();
         let mut term = (EFFECT.build)(&robot.site(), values);

@@ -1,4 +1,4 @@
-//! Effort of one joint that is reported late: a channel of its own, a sensor that is read less often than the others.
+//! Effort of one joint that is reported late: a separate channel, a sensor that is read less often than the others.
 
 use super::delay_line::Delayed;
 use super::law::array;
@@ -7,7 +7,7 @@ use super::{
     Simulated, Traits, Words,
 };
 
-/// Recorded effort of the joint: the true one as it was a while ago.
+/// Recorded effort of the joint: the true one, delayed.
 pub(super) static EFFECT: Effect = Effect {
     name: "late_effort",
     words: Words::new(

@@ -1,4 +1,5 @@
-//! A joint whose position is reported late: an encoder on a channel of its own, read or sent less often than the others.
+//! A joint whose position is reported late: an encoder on a separate channel, read or sent less often than the
+//! others.
 
 use std::sync::Arc;
 
@@ -9,8 +10,8 @@ use super::{
     PlaceKind, Simulated, Site, Term, Traits, Words,
 };
 
-/// The joint is where it will be reported a while later. The way there is the Taylor series of the recorded motion up to
-/// the jerk, so motion much faster than the delay is followed less exactly.
+/// The true position of the joint is the one that is reported after the delay. It is extrapolated by the Taylor
+/// series of the recorded motion up to the jerk, so motion much faster than the delay is less accurate.
 pub(super) static EFFECT: Effect = Effect {
     name: "late_position",
     words: Words::new(
@@ -56,9 +57,9 @@ struct LatePosition {
     joint: usize,
     values: [f64; 1],
     robot: Displaced,
-    /// Of the sample before \[rad/s² or m/s²\].
+    /// Acceleration at the previous sample \[rad/s² or m/s²\].
     acceleration_before: Option<f64>,
-    /// The last one \[rad/s³ or m/s³\].
+    /// Newest jerk \[rad/s³ or m/s³\].
     jerk: f64,
 }
 
@@ -73,7 +74,7 @@ impl LatePosition {
         })
     }
 
-    /// Position, velocity and acceleration of the joint as it truly moves.
+    /// True position, velocity and acceleration of the joint.
     fn truly(&self, at: &MotionSample<'_>) -> [f64; 3] {
         let (j, [late_s]) = (self.joint, self.values);
         let (q, qd, qdd) = (at.position[j], at.velocity[j], at.acceleration[j]);
@@ -102,7 +103,7 @@ impl Term for LatePosition {
 
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         let now = at.acceleration[self.joint];
-        // A repeated stamp has no change of its own.
+        // A repeated stamp gives no new jerk.
         if at.dt_s > 0.0
             && let Some(before) = self.acceleration_before
         {
@@ -132,7 +133,7 @@ mod tests {
         let mut data = Data::new(&robot.model);
         let late_s = 0.03;
         let mut term = (EFFECT.build)(&robot.site(), &[late_s]);
-        // The first joint swings at half a hertz, the second one stands.
+        // The first joint oscillates at half a hertz, the second one is at rest.
         let swing = |t: f64| {
             let (sin, cos) = (3.0 * t).sin_cos();
             [0.5 * sin, 1.5 * cos, -4.5 * sin]
@@ -155,7 +156,7 @@ mod tests {
             let largest = recorded[0].abs().max(1.0);
             for j in 0..2 {
                 let error = added[j] - (true_[j] - recorded[j]);
-                // The jerk is known from the second sample on, half a step late.
+                // The jerk is known from the second sample on, with a delay of half a step.
                 assert!(k == 0 || error.abs() < 0.02 * largest, "{k} {j}: {error}");
             }
         }

@@ -1,4 +1,4 @@
-//! What most terms in a joint are: an effort that follows from the instant alone.
+//! Terms in a joint whose effort depends on the present instant only.
 
 use super::{Effect, MotionSample, Site, Term};
 
@@ -14,8 +14,7 @@ struct JointLaw<const N: usize> {
     effort: Effort<N>,
 }
 
-/// Makes a term of `effort`, which is a function of the first `N` of `coordinates`; any that are missing
-/// are 0.
+/// Creates a term of `effort`, a function of the first `N` of `coordinates`; missing ones are 0.
 pub(super) fn joint_law<const N: usize>(
     effect: &'static Effect,
     site: &Site<'_>,
@@ -30,7 +29,7 @@ pub(super) fn joint_law<const N: usize>(
     })
 }
 
-/// The first `N` of `values`; any that are missing are 0.
+/// The first `N` of `values`; missing ones are 0.
 pub(super) fn array<const N: usize>(values: &[f64]) -> [f64; N] {
     std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0))
 }

@@ -1,4 +1,4 @@
-//! A link whose centre of mass is not where its URDF says.
+//! A link whose centre of mass differs from its URDF.
 
 use super::ghost::{Ghost, While};
 use super::{
@@ -11,8 +11,8 @@ use crate::Inertia;
 /// Tuned: for simulated cells only; not swept.
 const MOST_DRAWN_M: f64 = 0.06;
 
-/// A shift of a link's centre of mass, in the link's frame; its mass and the inertia about the centre
-/// stay. To first order linear in the shift.
+/// Shift of a link's centre of mass, in the link's frame; its mass and the inertia about the centre stay the same. To
+/// first order linear in the shift.
 pub static EFFECT: Effect = Effect {
     name: "link_com",
     words: Words::new(

@@ -1,4 +1,4 @@
-//! A link that is another body than its URDF says.
+//! A link whose body differs from its URDF in all inertial parameters.
 
 use super::ghost::{Ghost, While};
 use super::law::array;
@@ -7,8 +7,8 @@ use super::{
 };
 use crate::Inertia;
 
-/// A change of all ten inertial parameters of a link about the origin of its frame, in the order of [`Inertia::parameters`]:
-/// what describes a body that neither another mass nor another centre of mass makes.
+/// Change of all ten inertial parameters of a link about the origin of its frame, in the order of
+/// [`Inertia::parameters`]: for a body that differs by more than its mass or its centre of mass.
 pub(super) static EFFECT: Effect = Effect {
     name: "link_inertia",
     words: Words {
@@ -18,9 +18,9 @@ pub(super) static EFFECT: Effect = Effect {
         ..Words::new(
             "Link inertia",
             "link inertia",
-            "A link is another body than its model says: mass, centre and inertia together.",
+            "A link differs from its model in mass, centre of mass and inertia together.",
             "Link {place}: what is mounted on it or missing from it, against the URDF?",
-            "Link {place} is another body than its URDF says, and no one name fits that: its mass is off by {delta_mass_kg}, its first moment (mass times centre) by ({delta_first_moment_x_kgm:number}, {delta_first_moment_y_kgm:number}, {delta_first_moment_z_kgm:number}) kg m, and so is its inertia; what is left depends on the motion of all joints that carry it.",
+            "Link {place} differs from its URDF in several inertial parameters: its mass by {delta_mass_kg}, its first moment (mass times centre) by ({delta_first_moment_x_kgm:number}, {delta_first_moment_y_kgm:number}, {delta_first_moment_z_kgm:number}) kg m, and its inertia as well. The effort of this difference depends on the motion of all joints that carry the link.",
         )
     },
     family: Family::Body,

@@ -11,8 +11,8 @@ use crate::Inertia;
 /// Tuned: for simulated cells only; not swept.
 const MOST_DRAWN: f64 = 0.6;
 
-/// A change of a link's mass; its centre of mass and the inertia about that stay, so it is a point mass
-/// at the centre of mass.
+/// Change of a link's mass; its centre of mass and the inertia about it stay the same, so it is a point mass at the
+/// centre of mass.
 pub(super) static EFFECT: Effect = Effect {
     name: "link_mass",
     words: Words {

@@ -1,4 +1,4 @@
-//! Friction in proportion to what the gear transmits.
+//! Friction proportional to the effort that the gear transmits.
 
 use super::law::joint_law;
 use super::{

@@ -1,6 +1,6 @@
-//! Friction that grows with the square of what the gear transmits: the next term of the series in the load, after the
-//! friction that is linear in it (P. Hamon, M. Gautier and P. Garrec, "Dynamic Identification of Robots with a Dry
-//! Friction Model Depending on Load and Velocity", IROS 2010). Parts that deform under load rub so.
+//! Friction proportional to the square of the effort that the gear transmits: the next term of the series in the load
+//! after the linear one (P. Hamon, M. Gautier and P. Garrec, "Dynamic Identification of Robots with a Dry Friction
+//! Model Depending on Load and Velocity", IROS 2010). Parts that deform under load rub in this way.
 
 use super::law::joint_law;
 use super::{

@@ -1,4 +1,4 @@
-//! A body that the arm carries all the time.
+//! A body that the arm carries permanently.
 
 use super::ghost::{Ghost, While};
 use super::law::array;
@@ -8,9 +8,9 @@ use super::{
 };
 use crate::Inertia;
 
-/// A rigid body on the tool link: the robot's dynamics are linear in its ten parameters about the link's
-/// origin, so these are searched. Files hold the mass, its centre and the inertia about that. The inertia
-/// is not held to be one: a motion that hardly shows it may leave it with any sign.
+/// A rigid body on the tool link. The robot's dynamics are linear in its ten parameters about the link's origin, so
+/// these are searched. Files hold the mass, its centre and the inertia about that centre. The inertia is not
+/// constrained to be physical: if the motion hardly excites it, its sign is arbitrary.
 pub static EFFECT: Effect = Effect {
     name: "payload",
     words: Words::new(
@@ -44,11 +44,12 @@ pub static EFFECT: Effect = Effect {
     },
 };
 
-/// Radius of gyration of a body that is drawn \[m\].
+/// Radius of gyration of a drawn body \[m\].
 /// Tuned: for simulated cells only; not swept.
 const DRAWN_RADIUS_M: f64 = 0.04;
 
-/// A body at random; if it is there for a while, from and to shares of the shortest recording between these.
+/// Draws a random body. If it is temporary, its start and end are drawn from these ranges, as shares of the shortest
+/// recording.
 pub(super) fn drawn(draw: &mut Draw<'_>, window: Option<[[f64; 2]; 2]>) -> Option<Drawn> {
     let com_m = [[-0.04, 0.04], [-0.04, 0.04], [0.03, 0.12]]
         .map(|[least, most]| draw.chance.between(least, most));
@@ -105,7 +106,7 @@ pub(super) fn inertia(p: &[f64; 10]) -> Inertia {
     Inertia::new(mass, [x, y, z], [xx, xy, xz, yy, yz, zz])
 }
 
-/// [`BODY_PARAMETERS`] from the ten about the origin.
+/// [`BODY_PARAMETERS`] from the ten parameters about the origin.
 pub(super) fn parameters(coordinates: &[f64; 10]) -> [f64; 10] {
     let body = Inertia::from_parameters(*coordinates);
     let [x, y, z] = body.com_m();

@@ -48,7 +48,7 @@ pub static EFFECT: Effect = Effect {
     },
 };
 
-/// Ten entries of a body and those of two times behind them.
+/// Entries of the ten body parameters, followed by those of two times.
 pub(super) const fn with_times<T: Copy>(body: [T; 10], start: T, end: T) -> [T; 12] {
     let [mass, x, y, z, a, b, c, d, e, f] = body;
     [mass, x, y, z, a, b, c, d, e, f, start, end]

@@ -1,9 +1,9 @@
-//! All terms of a robot together: from the rigid body's effort to the recorded one.
+//! All terms of a robot: from the rigid body's effort to the recorded one.
 
 use super::{Layer, MotionSample, Term, TermError, TermSpec};
 use crate::Model;
 
-/// Terms in the order in which they act: bodies, joints, recording.
+/// Terms in the order of application: bodies, joints, recording.
 #[derive(Debug, Default)]
 pub struct Physics {
     terms: Vec<Box<dyn Term>>,
@@ -13,7 +13,7 @@ pub struct Physics {
 }
 
 impl Physics {
-    /// Puts the terms in order, for a robot of `joint_count` joints.
+    /// Sorts the terms, for a robot of `joint_count` joints.
     pub fn new(mut terms: Vec<Box<dyn Term>>, joint_count: usize) -> Self {
         terms.sort_by_key(|term| term.effect().layer);
         let before = |layer: Layer| terms.iter().filter(|t| t.effect().layer < layer).count();
@@ -24,9 +24,8 @@ impl Physics {
         }
     }
 
-    /// Makes the terms of `specs` for a robot, each for the robot as those before it have left it: a
-    /// payload weighs on a tilted base as it must, and an elastic joint bears the payload, wherever in
-    /// the list they stand.
+    /// Builds the terms of `specs` for a robot. Each term is built for the robot as changed by the previous ones,
+    /// whatever the order of the list: a payload acts on a tilted base, and an elastic joint carries the payload.
     ///
     /// # Errors
     /// If a term cannot be built.
@@ -49,37 +48,36 @@ impl Physics {
         Ok(Self::new(terms, model.dof()))
     }
 
-    /// The terms in the order in which they act.
+    /// The terms in the order of application.
     pub fn terms(&self) -> &[Box<dyn Term>] {
         &self.terms
     }
 
-    /// The terms of [`Layer::Body`]: those that must know the robot.
+    /// The terms of [`Layer::Body`], which depend on the robot.
     pub fn bodies(&self) -> &[Box<dyn Term>] {
         &self.terms[..self.bodies]
     }
 
-    /// Whether there is none.
+    /// Whether there are no terms.
     pub fn is_empty(&self) -> bool {
         self.terms.is_empty()
     }
 
-    /// Forgets what came before: a new recording or a gap.
+    /// Clears the state before a new recording or after a gap.
     pub fn reset(&mut self) {
         for term in &mut self.terms {
             term.reset();
         }
     }
 
-    /// Turns `effort`, the rigid body's at this instant, into what is recorded \[N m or N\]; to be called
-    /// once per sample. [`MotionSample::transmitted`] is passed over: it is `effort` as it comes. Does not
-    /// allocate.
+    /// Transforms `effort`, the rigid body's at this instant, into the recorded one \[N m or N\]; call once per
+    /// sample. [`MotionSample::transmitted`] is ignored, because it is computed from `effort`. Does not allocate.
     pub fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         self.act_bodies(at, effort);
         self.act_joints(at, effort);
     }
 
-    /// The first half of [`Physics::act`]: turns `effort`, the rigid body's, into what the gears transmit.
+    /// First half of [`Physics::act`]: transforms `effort`, the rigid body's, into the transmitted effort.
     pub fn act_bodies(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         let at = with(&mut self.transmitted, at, effort);
         for term in &mut self.terms[..self.bodies] {
@@ -87,7 +85,7 @@ impl Physics {
         }
     }
 
-    /// The second half of [`Physics::act`]: turns `effort`, what the gears transmit, into what is recorded.
+    /// Second half of [`Physics::act`]: transforms `effort`, the transmitted one, into the recorded effort.
     pub fn act_joints(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         let at = with(&mut self.transmitted, at, effort);
         for term in &mut self.terms[self.bodies..] {
@@ -96,7 +94,7 @@ impl Physics {
     }
 }
 
-/// The instant with `effort` as the transmitted one, which is kept in `memory`.
+/// The instant with `effort` as the transmitted effort, which is stored in `memory`.
 fn with<'a>(memory: &'a mut [f64], at: &MotionSample<'a>, effort: &[f64]) -> MotionSample<'a> {
     memory.copy_from_slice(effort);
     MotionSample {

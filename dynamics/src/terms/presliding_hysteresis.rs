@@ -1,4 +1,4 @@
-//! Friction that stretches bristles before it slides: `LuGre`.
+//! Friction with elastic presliding: the `LuGre` model.
 
 use super::law::array;
 use super::{
@@ -104,7 +104,7 @@ impl Term for PreslidingHysteresis {
         let velocity = at.velocity[self.joint];
         let before = self.velocity.unwrap_or(velocity);
         if at.dt_s > 0.0 || self.velocity.is_none() {
-            // Over the distance moved the deflection nears ±1 exponentially, whatever the speed.
+            // Over the distance moved the deflection approaches ±1 exponentially, at any speed.
             let distance = 0.5 * (before + velocity) * at.dt_s;
             let aim = distance.signum();
             let left = (-steepness * distance.abs()).exp();
@@ -121,7 +121,7 @@ mod tests {
     use super::super::tests::{TwoJoints, sample};
     use super::*;
 
-    /// The model as published, by small steps of Euler's.
+    /// The published model, integrated by small Euler steps.
     #[test]
     fn agrees_with_the_published_equations() {
         let (coulomb, stiffness, damping) = (3.0, 140.0, 1.4);

@@ -1,4 +1,4 @@
-//! The rotor's inertia, felt through the gear.
+//! Inertia of the rotor, as seen through the gear.
 
 use super::law::joint_law;
 use super::{

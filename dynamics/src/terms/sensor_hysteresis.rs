@@ -1,6 +1,7 @@
-//! A torque sensor that lags behind its torque, as flexures with friction at their clamps do: K. Kuhnen, "Modeling,
+//! A torque sensor with hysteresis, as caused by flexures with friction at their clamps: K. Kuhnen, "Modeling,
 //! Identification and Compensation of Complex Hysteretic Nonlinearities: A Modified Prandtl-Ishlinskii Approach",
-//! *European Journal of Control* 9(4), 2003, section 2, with stops of even widths and equal weights.
+//! *European Journal of Control* 9(4), 2003, section 2, with stop operators of evenly spaced widths and equal
+//! weights.
 
 use super::law::array;
 use super::{
@@ -8,14 +9,15 @@ use super::{
     Scale, Simulated, Term, Traits, Words,
 };
 
-/// Clamps that slip one after the other.
+/// Number of stop operators.
 /// Resolution: a curve of this many pieces lies within 3 % of one of any number.
 const STOPS: usize = 4;
 
-/// Recorded effort: τ - h z, z being the mean of [`STOPS`] stops, each weighted by its width. A stop follows the torque
-/// within ± its width; the widest is r wide.
+/// Recorded effort: τ - h z, where z is the mean of [`STOPS`] stop operators, each weighted by its width. A stop
+/// follows the torque within ± its width; the widest has the width r.
 ///
-/// z is 1 once the torque has risen by 2 r and -1 once it has fallen by as much, however fast. A recording begins with z = 0.
+/// z is 1 after the torque has risen by 2 r and -1 after it has fallen by as much, at any rate. A recording begins
+/// with z = 0.
 pub(super) static EFFECT: Effect = Effect {
     name: "sensor_hysteresis",
     words: Words::new(
@@ -64,7 +66,7 @@ pub(super) static EFFECT: Effect = Effect {
     },
 };
 
-/// A stop is no narrower \[N m or N\].
+/// Smallest width of a stop \[N m or N\].
 /// Resolution: keeps a quotient finite; far below any effort.
 const LEAST_WIDTH: f64 = 1e-9;
 
@@ -72,9 +74,9 @@ const LEAST_WIDTH: f64 = 1e-9;
 struct SensorHysteresis {
     joint: usize,
     values: [f64; 2],
-    /// How far each stop has followed the torque, in its own widths: from -1 to 1.
+    /// State of each stop relative to its width, from -1 to 1.
     stops: [f64; STOPS],
-    /// The torque before.
+    /// Torque of the previous sample.
     before: Option<f64>,
 }
 
@@ -113,7 +115,7 @@ mod tests {
     use super::super::tests::{TwoJoints, sample};
     use super::*;
 
-    /// Readings along torques of the first joint.
+    /// Recorded efforts along torques of the first joint.
     fn readings(values: &[f64], torques: impl Iterator<Item = f64>) -> Vec<f64> {
         let robot = TwoJoints::new();
         let mut term = (EFFECT.build)(&robot.site(), values);
@@ -149,7 +151,7 @@ mod tests {
 
     #[test]
     fn a_turn_goes_twice_as_far_as_a_start() {
-        // Masing's rule, which friction in clamps obeys.
+        // Masing's rule, which holds for friction in clamps.
         let read = readings(&[1.0, 2.0], [0.0, 1.0, 5.0, 3.0].into_iter());
         let (start, turn) = (1.0 - read[1], read[3] - 3.0);
         assert!((1.0 - 2.0 * start + turn).abs() < 1e-9, "{start} {turn}");

@@ -1,4 +1,4 @@
-//! Efforts that are reported later and later, because their clock runs slow.
+//! Efforts with a growing delay, because their clock runs slow.
 
 use super::delay_line::DelayLine;
 use super::law::array;
@@ -7,10 +7,10 @@ use super::{
     PlaceKind, Simulated, Term, Traits, Words,
 };
 
-/// Seconds of an hour.
+/// Seconds per hour.
 const HOUR_S: f64 = 3600.0;
 
-/// Recorded effort: the true one of all joints as it was a while ago, which grows from the start of the session on.
+/// Recorded effort: the true one of all joints with a delay that grows from the start of the session on.
 pub(super) static EFFECT: Effect = Effect {
     name: "slow_clock",
     words: Words::new(

@@ -1,4 +1,4 @@
-//! Terms as files hold them.
+//! Terms in files.
 
 use std::collections::BTreeMap;
 
@@ -13,18 +13,17 @@ mod error;
 
 pub use error::TermError;
 
-/// A term as a file holds it: `{effect: viscous_friction, joint: joint1, parameters:
-/// {viscous_nms_per_rad: 3.0}}`.
+/// A term in a file: `{effect: viscous_friction, joint: joint1, parameters: {viscous_nms_per_rad: 3.0}}`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TermSpec {
     /// Canonical name of the effect.
     pub effect: String,
-    /// The joint it is in, for effects of a joint.
+    /// The joint, for effects of a joint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
-    /// The link it is in, for effects of a link. For those of the tool and of the base it may be left
-    /// out: the link `tool`, or else the last of the chain, and the root.
+    /// The link, for effects of a link. Optional for effects of the tool (default: the link `tool`, or else the last
+    /// of the chain) and of the base (default: the root).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
     /// The joint that drives it, for couplings.
@@ -67,11 +66,10 @@ impl TermSpec {
         }
     }
 
-    /// Makes the term for a robot.
+    /// Builds the term for a robot.
     ///
     /// # Errors
-    /// If the effect, its place or a parameter is unknown, a place or parameter is missing, or a value
-    /// impossible.
+    /// If the effect, its place or a parameter is unknown, a place or parameter is missing, or a value is impossible.
     pub fn build(&self, model: &Model) -> Result<Box<dyn Term>, TermError> {
         let effect = self.effect()?;
         let site = self.site(model)?;
@@ -101,7 +99,7 @@ impl TermSpec {
         Ok((effect.build)(&site, &coordinates))
     }
 
-    /// What is left of it in a session that begins now: of a step, the simpler effect as it was afterwards.
+    /// The term for a session that begins now: for a step, the simpler effect with its value after the step.
     #[must_use]
     pub fn from_now_on(&self) -> Self {
         let known = self.effect().ok().filter(|e| e.time() == Time::Step);
@@ -119,7 +117,7 @@ impl TermSpec {
         afterwards.unwrap_or_else(|| self.clone())
     }
 
-    /// A payload that is there for a part of the session as one that stays, if it is there at this time.
+    /// A payload of a part of the session as a permanent one, if it is present at this time.
     fn without_times(self, session_s: f64) -> Self {
         let time = |name: &str| self.parameters.get(name).copied();
         let is_there = time("t_start_s").is_some_and(|start_s| start_s <= session_s)
@@ -136,8 +134,8 @@ impl TermSpec {
         }
     }
 
-    /// What it is at a time of its session: of what changes steadily, the simpler effect with the number that it has then;
-    /// of what is there for a part of the session, that part aside, if it is there then.
+    /// The term at a time of its session: for a continuous change, the simpler effect with its value at that time;
+    /// for a part of a session, the permanent effect, if it is present at that time.
     #[must_use]
     pub fn at_session(self, session_s: f64) -> Self {
         if self.effect().is_ok_and(|e| e.traits.in_session) {
@@ -162,10 +160,10 @@ impl TermSpec {
         }
     }
 
-    /// The effect it names.
+    /// The effect with the spec's name.
     ///
     /// # Errors
-    /// If there is none of that name.
+    /// If the effect does not exist.
     pub fn effect(&self) -> Result<&'static Effect, TermError> {
         effect(&self.effect).ok_or_else(|| TermError::UnknownEffect {
             effect: self.effect.clone(),
@@ -173,7 +171,7 @@ impl TermSpec {
         })
     }
 
-    /// The site it names in this robot.
+    /// The site of the spec in this robot.
     ///
     /// # Errors
     /// If the effect or a joint or link is unknown, or one is missing.
@@ -252,10 +250,10 @@ impl TermSpec {
 }
 
 impl Effect {
-    /// The index of a parameter that can have this value.
+    /// Index of a parameter, after checking its value.
     ///
     /// # Errors
-    /// If there is no such parameter or the value is impossible.
+    /// If the parameter does not exist or the value is impossible.
     pub fn check(&self, parameter: &str, value: f64) -> Result<usize, TermError> {
         let found = self.parameters.iter().position(|p| p.name == parameter);
         let Some(index) = found else {
@@ -266,7 +264,7 @@ impl Effect {
             });
         };
         let known = &self.parameters[index];
-        // Beside a twin that already holds the effect, a term may say that there is less of it.
+        // Relative to a twin that already contains the effect, a term may reduce it.
         let minimum = match self.words.less {
             Some(_) if index == 0 => f64::NEG_INFINITY,
             _ => known.minimum,

@@ -1,4 +1,4 @@
-//! A term that splits its joint in rotor and link: all that those differ in is what is between the two.
+//! A term that splits its joint into rotor and link, with an exchangeable transmission between the two.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use super::law::array;
 use super::two_masses::{Transmission, TwoMasses};
 use super::{Effect, Expansion, MotionSample, Site, Term};
 
-/// A joint with a rotor of the inertia J, the first coordinate, and something between it and the link.
+/// A joint with a rotor of the inertia J, the first coordinate, and a transmission between it and the link.
 #[derive(Debug)]
 struct SplitJoint<T> {
     effect: &'static Effect,
@@ -16,7 +16,7 @@ struct SplitJoint<T> {
     masses: TwoMasses,
 }
 
-/// Makes the term at a site.
+/// Builds the term at a site.
 pub(super) fn split_joint<T>(
     effect: &'static Effect,
     site: &Site<'_>,

@@ -1,4 +1,4 @@
-//! Friction that a controller subtracts from the effort before it publishes it, and subtracts too much of.
+//! Friction compensation that a controller subtracts from the effort before publishing it, and that is too large.
 
 use super::law::joint_law;
 use super::{
@@ -6,7 +6,7 @@ use super::{
     Words, sign,
 };
 
-/// Effort -F sgn(qd): what is left of the friction drives the joint, which no friction does.
+/// Effort -F sgn(qd): the overcompensation seems to drive the joint, which real friction never does.
 pub(super) static EFFECT: Effect = Effect {
     name: "subtracted_friction",
     words: Words::new(
@@ -57,7 +57,7 @@ mod tests {
             let mut effort = [3.0, 9.0];
             subtracted.act(&at.view(), &mut effort);
             assert!((3.0 - effort[0]) * velocity >= 0.0);
-            // The one is the other's opposite.
+            // The two terms cancel.
             friction.act(&at.view(), &mut effort);
             assert!((effort[0] - 3.0).abs() < 1e-12 && effort[1] == 9.0);
         }

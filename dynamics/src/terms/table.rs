@@ -1,4 +1,4 @@
-//! What no name fits: a curve, as measured.
+//! A residual that no effect of the library explains, as a measured curve.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,15 +11,15 @@ use super::{
 };
 use crate::Model;
 
-/// What has no name: a [`Table`] is all there is to it.
+/// An effect without a name: its only parameter is a [`Table`].
 pub static EFFECT: Effect = Effect {
     name: "unknown",
     words: Words::new(
         "Unknown",
         "something that no name fits",
-        "Something that no name of the library fits; the correction only describes it.",
+        "An effort that no effect of the library explains; the correction only describes it.",
         "Joint {place}: look at it, and at its sensor, while it moves as in the recordings.",
-        "Something in joint {place} has no name.",
+        "Joint {place} has an effort that no effect of the library explains.",
     ),
     family: Family::Unnamed,
     place: PlaceKind::Joint,
@@ -38,7 +38,7 @@ pub static EFFECT: Effect = Effect {
         describes_only: true,
         ..Traits::NONE
     },
-    // Without a table there is nothing to describe.
+    // The default curve is zero.
     build: |site, _| {
         let table = Table {
             against: Against::Position,
@@ -56,7 +56,7 @@ pub static EFFECT: Effect = Effect {
     },
 };
 
-/// What a curve is drawn against.
+/// Argument of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Against {
@@ -64,22 +64,23 @@ pub enum Against {
     Position,
     /// Velocity of a joint \[rad/s or m/s\].
     Velocity,
-    /// Velocity of a joint less that of the next one in the URDF, as parts feel it that rub \[rad/s or m/s\].
+    /// Velocity of a joint minus that of the next one in the URDF: the relative velocity of parts that rub
+    /// \[rad/s or m/s\].
     VelocityDifference,
-    /// The same with a plus, for axes that point in opposite directions \[rad/s or m/s\].
+    /// Sum of these two velocities, for axes that point in opposite directions \[rad/s or m/s\].
     VelocitySum,
     /// Acceleration of a joint \[rad/s² or m/s²\].
     Acceleration,
     /// Effort that a joint's gear transmits \[N m or N\].
     Load,
-    /// The same times the direction of the joint's motion: above zero where the joint works against the load, below where
-    /// the load drives it \[N m or N\].
+    /// Transmitted effort times the direction of motion: positive if the joint drives the load, negative if the load
+    /// drives the joint \[N m or N\].
     DrivenLoad,
-    /// How far a joint's load has changed since it last turned round, at most as far as the outer knots \[N m or N\].
+    /// Change of a joint's load since its last reversal, limited to the outer knots \[N m or N\].
     LoadTurned,
-    /// Time since a joint last stood still \[s\].
+    /// Time since a joint was last at rest \[s\].
     SinceRest,
-    /// How far a joint has moved since it last turned round \[rad or m\].
+    /// Distance that a joint has moved since its last reversal \[rad or m\].
     SinceTurn,
     /// Time since the start of the recording \[s\].
     RecordingTime,
@@ -87,52 +88,52 @@ pub enum Against {
     SessionTime,
 }
 
-/// A curve through knots, straight between them and held at the ends, or repeated.
+/// A piecewise linear curve, constant beyond its knots or periodic.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// What it is drawn against.
+    /// Argument of the curve.
     pub against: Against,
-    /// The joint whose position, velocity, acceleration or load that is.
+    /// Joint whose position, velocity, acceleration or load is the argument.
     pub of_joint: usize,
-    /// Whether the effort turns its sign with the joint's direction of motion, as friction's does.
+    /// Whether the effort changes its sign with the joint's direction of motion, like friction.
     pub by_direction: bool,
-    /// After how much of what it is drawn against it repeats, if it does: more than the knots span.
+    /// Period of the argument, if the curve is periodic: longer than the span of the knots.
     pub period: Option<f64>,
-    /// Where the curve is given, rising.
+    /// Knots, in increasing order.
     pub knots: Vec<f64>,
     /// Effort at the knots \[N m or N\].
     pub values: Vec<f64>,
 }
 
-/// A [`Table`] as a file holds it.
+/// A [`Table`] in a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TableSpec {
-    /// What it is drawn against.
+    /// Argument of the curve.
     pub against: Against,
-    /// The joint whose position, velocity, acceleration or load that is; the effect's own by default.
+    /// Joint whose position, velocity, acceleration or load is the argument; the effect's own by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of_joint: Option<String>,
-    /// Whether the effort turns its sign with the joint's direction of motion, as friction's does.
+    /// Whether the effort changes its sign with the joint's direction of motion, like friction.
     #[serde(default)]
     pub by_direction: bool,
-    /// After how much of what it is drawn against it repeats, if it does: more than the knots span.
+    /// Period of the argument, if the curve is periodic: longer than the span of the knots.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub period: Option<f64>,
-    /// Where the curve is given, rising.
+    /// Knots, in increasing order.
     pub knots: Vec<f64>,
     /// Effort at the knots \[N m or N\].
     pub values: Vec<f64>,
 }
 
 impl Table {
-    /// Whether it is a curve over the velocity of the joint that it is in: friction, whatever bends it.
+    /// Whether it is a curve over the velocity of its own joint, that is, friction of any shape.
     pub fn is_friction_of(&self, joint: usize) -> bool {
         self.against == Against::Velocity && self.of_joint == joint
     }
 
-    /// A finding of it in the joint of index `joint`, called `place`; `joints` are the names of all. `peak` is its largest
-    /// effort \[N m or N\], and where it is.
+    /// Sentence of a finding in the joint of index `joint`, named `place`; `joints` are the names of all. `peak` is
+    /// the largest effort \[N m or N\] and its argument.
     pub fn sentence(
         &self,
         joint: usize,
@@ -145,7 +146,7 @@ impl Table {
         });
         if self.is_friction_of(joint) {
             return format!(
-                "The friction of joint {place} is more than a constant and a share of its velocity, and no effect of the library bends it so{peak} rad/s."
+                "The friction of joint {place} is not a sum of Coulomb and viscous friction, and no effect of the library has its shape{peak} rad/s."
             );
         }
         let on = self.depends_on(joint, joints);
@@ -154,7 +155,7 @@ impl Table {
         )
     }
 
-    /// What a curve in the joint of index `joint` depends on, in words; `joints` are the names of all.
+    /// Argument of a curve in the joint of index `joint`, in words; `joints` are the names of all.
     pub fn depends_on(&self, joint: usize, joints: &[String]) -> String {
         let of = if self.of_joint == joint {
             "its own".to_owned()
@@ -170,23 +171,30 @@ impl Table {
             Against::Load if self.of_joint == joint => "its load".to_owned(),
             Against::Load => format!("{of} load"),
             Against::DrivenLoad => {
-                "its load, and on whether the joint drives the load or the load the joint".to_owned()
+                "its load, and on whether the joint drives the load or the load the joint"
+                    .to_owned()
             }
             Against::LoadTurned => {
-                "the way its load came: how far it has changed since it last turned round (hysteresis)".to_owned()
+                "the change of its load since the load's last reversal (hysteresis)".to_owned()
             }
             Against::SinceRest if self.of_joint == joint => {
-                "the time since the joint last stood still".to_owned()
+                "the time since the joint was last at rest".to_owned()
             }
-            Against::SinceRest => format!("the time since joint {} last stood still", joints[self.of_joint]),
+            Against::SinceRest => format!(
+                "the time since joint {} was last at rest",
+                joints[self.of_joint]
+            ),
             Against::SinceTurn => {
-                format!("how far joint {} has moved since it last turned round", joints[self.of_joint])
+                format!(
+                    "the distance that joint {} has moved since its last reversal",
+                    joints[self.of_joint]
+                )
             }
             Against::RecordingTime => "the time since the start of the recording".to_owned(),
             Against::SessionTime => "the time since the start of the session".to_owned(),
         };
         let direction = if self.by_direction {
-            ", and turns its sign with the direction of motion, as friction does"
+            ", and changes its sign with the direction of motion, like friction"
         } else {
             ""
         };
@@ -199,7 +207,7 @@ impl Table {
 }
 
 impl Table {
-    /// Two velocities taken together, in words.
+    /// Combination of two velocities, in words.
     fn of_two(&self, how: &str, joints: &[String]) -> String {
         let (one, next) = (self.of_joint, self.of_joint + 1);
         let next = joints.get(next).map_or("none", String::as_str);
@@ -234,10 +242,10 @@ impl TableSpec {
     }
 }
 
-/// Makes an `unknown` effect of the curve `table` in the joint of `site`.
+/// Creates an `unknown` effect with the curve `table` in the joint of `site`.
 ///
 /// # Errors
-/// If the curve has no knots, their number is not that of the values, they do not rise, the period is not longer than they
+/// If there are no knots, not one value per knot, the knots do not increase, the period is not longer than their
 /// span, or a number is not finite.
 pub fn table(site: &Site<'_>, table: Table) -> Result<Box<dyn Term>, TermError> {
     let wrong = |reason| Err(TermError::Table { reason });
@@ -276,7 +284,7 @@ struct Curve {
 }
 
 impl Table {
-    /// Reads what the curve is drawn against.
+    /// Creates the gauge of the curve's argument.
     pub fn gauge(&self) -> Gauge {
         let band = self.knots.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         Gauge::new(self.against, self.of_joint, band)

@@ -1,4 +1,4 @@
-//! Viscous friction that falls as the joint warms up.
+//! Viscous friction that decreases as the joint warms up.
 
 use super::law::joint_law;
 use super::{
@@ -6,15 +6,15 @@ use super::{
     Simulated, Traits, Words,
 };
 
-/// Shortest time constant that is searched, and that is told \[s\]: what wants a shorter one is no warmth.
+/// Shortest time constant that is searched and reported \[s\]; a faster change is not warming up.
 /// Physical: no gearbox warms up at once.
 const SEARCHED_FROM_S: f64 = 3.0;
-/// No joint warms up faster where one is drawn \[s\].
+/// Shortest time constant that is drawn \[s\].
 /// Tuned: for simulated cells only, whose recordings are short; not swept.
 const FASTEST_DRAWN_S: f64 = 3.2;
 
-/// Effort (Fw + Fx exp(-t/T)) qd, t since the start of the recording: the joint is cold then. No gearbox warms up at
-/// once: T is searched from 3 s on, and one that would be shorter is not told.
+/// Effort (Fw + Fx exp(-t/T)) qd, where t is the time since the start of the recording, at which the joint is cold.
+/// No gearbox warms up at once: T is searched from 3 s on, and a shorter one is not reported.
 pub(super) static EFFECT: Effect = Effect {
     name: "temperature_viscous",
     words: Words::new(

@@ -1,4 +1,4 @@
-//! What every term must do, and what tests of single terms share.
+//! Tests of all terms, and helpers for tests of single terms.
 
 use super::*;
 use crate::{Data, rnea};
@@ -28,7 +28,7 @@ impl TwoJoints {
         }
     }
 
-    /// The first joint, driven by the second, and the link that `place` asks for.
+    /// The first joint, driven by the second, and the link that `place` needs.
     pub fn site_for(&self, place: PlaceKind) -> Site<'_> {
         let link = match place {
             PlaceKind::Tool => self.model.tool_link(),
@@ -48,7 +48,7 @@ impl TwoJoints {
     }
 }
 
-/// An instant that owns its numbers.
+/// A motion sample that owns its values.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Instant {
     pub dt_s: f64,
@@ -90,7 +90,7 @@ pub(super) fn sample(
     }
 }
 
-/// Two efforts are the same but for rounding.
+/// Asserts that two efforts are equal except for rounding.
 pub(super) fn assert_near(found: [f64; 2], expected: [f64; 2]) {
     let is_near = |(a, b): (f64, f64)| (a - b).abs() < 1e-9;
     assert!(
@@ -99,19 +99,19 @@ pub(super) fn assert_near(found: [f64; 2], expected: [f64; 2]) {
     );
 }
 
-/// What a term adds at one instant, the first.
+/// Effort that a term adds at a single first instant.
 pub(super) fn push(term: &mut dyn Term, q: [f64; 2], qd: [f64; 2], qdd: [f64; 2]) -> [f64; 2] {
     let mut effort = [0.0; 2];
     term.act(&sample(0.0, 0.0, q, qd, qdd).view(), &mut effort);
     effort
 }
 
-/// Some motion at 100 Hz, with the rigid body's effort.
+/// A motion at 100 Hz, with the rigid body's effort.
 pub(super) fn motion(model: &Model, samples: u32) -> Vec<Instant> {
     motion_with(model, samples, 0.01)
 }
 
-/// The same motion on another clock.
+/// [`motion`] with another step.
 pub(super) fn motion_with(model: &Model, samples: u32, dt: f64) -> Vec<Instant> {
     let mut data = Data::new(model);
     let wave = |k: usize, order: i32, t: f64| {
@@ -138,7 +138,7 @@ pub(super) fn motion_with(model: &Model, samples: u32, dt: f64) -> Vec<Instant> 
         .collect()
 }
 
-/// What a term makes of a motion's rigid effort, less that effort.
+/// Effort that a term adds along a motion.
 pub(super) fn run(term: &mut dyn Term, motion: &[Instant]) -> Vec<[f64; 2]> {
     term.reset();
     motion
@@ -151,8 +151,8 @@ pub(super) fn run(term: &mut dyn Term, motion: &[Instant]) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Coordinates that a term of this effect may well have: factors near 1, shapes within their range,
-/// and times within the motion.
+/// Plausible coordinates for a term of this effect: factors near 1, shapes within their range, and times within the
+/// motion.
 pub(super) fn plausible(effect: &Effect) -> Vec<f64> {
     let one = |(i, coordinate): (usize, &Coordinate)| match coordinate.kind {
         CoordinateKind::Factor { .. } => 0.7 + 0.13 * i as f64,
@@ -168,7 +168,7 @@ pub(super) fn plausible(effect: &Effect) -> Vec<f64> {
             scale: Scale::Linear,
             ..
         } => 0.8 * lower + 0.2 * upper,
-        // Of an effort of some 20 N m.
+        // Relative to an effort of about 20 N m.
         CoordinateKind::Shape { lower, .. } => 10.0 * lower,
         CoordinateKind::RecordingTime => 0.5 + 0.05 * i as f64,
         CoordinateKind::SessionTime => 100.5 + 0.05 * i as f64,
@@ -217,7 +217,7 @@ fn coordinates_and_parameters_say_the_same() {
                 effect.name
             );
         }
-        // Where nothing acts, no direction or phase is known; numbers they must be.
+        // Without any effect, direction and phase are arbitrary but must be numbers.
         let nothing = (effect.to_parameters)(&vec![0.0; coordinates.len()]);
         assert!(nothing.iter().all(|x| x.is_finite()), "{}", effect.name);
     }
@@ -240,7 +240,7 @@ fn a_term_survives_its_file() {
     }
 }
 
-/// The motion after the robot has stood where it begins.
+/// The motion, preceded by a standstill at its beginning.
 fn after_a_standstill(mut motion: Vec<Instant>) -> Vec<Instant> {
     let at = |k: u32| Instant {
         dt_s: if k == 0 { 0.0 } else { 0.01 },
@@ -320,7 +320,7 @@ fn friction_only_takes() {
     let motion = motion(&robot.model, 300);
     let friction = EFFECTS.iter().filter(|effect| {
         let family = matches!(effect.family, Family::PlainFriction | Family::Friction);
-        // What yields before it slides gives some of it back.
+        // Presliding friction is elastic and returns part of its energy.
         family && effect.name != "presliding_hysteresis"
     });
     for effect in friction {

@@ -7,8 +7,8 @@ use super::{
     Traits, Words,
 };
 
-/// Recorded effort: the true one as it was a while ago, straight between samples, the same for all
-/// joints. Before that the first sample is held.
+/// Recorded effort: the true one, delayed, with linear interpolation between samples, the same for all joints. Before
+/// the first sample its value is held.
 pub(super) static EFFECT: Effect = Effect {
     name: "torque_delay",
     words: Words::new(
@@ -43,7 +43,7 @@ mod tests {
     use super::super::tests::{TwoJoints, sample};
     use super::*;
 
-    /// Largest error of a delayed straight line, which interpolation cannot miss.
+    /// Largest error for a linear effort, which interpolation reproduces exactly.
     fn error(delay_s: f64, dt_s: f64, samples: u32) -> f64 {
         let robot = TwoJoints::new();
         let mut term = (EFFECT.build)(&robot.site(), &[delay_s]);

@@ -54,7 +54,7 @@ pub static EFFECT: Effect = Effect {
 #[derive(Debug)]
 struct TorqueGain {
     joint: usize,
-    /// Gain less 1.
+    /// Gain minus 1.
     values: [f64; 1],
 }
 

@@ -1,4 +1,4 @@
-//! A sensor that smooths.
+//! A sensor with a low-pass.
 
 use std::f64::consts::TAU;
 
@@ -8,8 +8,8 @@ use super::{
     Scale, Simulated, Site, Term, Traits, Words,
 };
 
-/// Recorded effort: the true one through a first-order low-pass, H(s) = ω / (s + ω), the same for all
-/// joints. Solved exactly for an input that runs straight from one sample to the next.
+/// Recorded effort: the true one through a first-order low-pass, H(s) = ω / (s + ω), the same for all joints. Solved
+/// exactly for an input that is linear between samples.
 pub(super) static EFFECT: Effect = Effect {
     name: "torque_lowpass",
     words: Words::new(
@@ -46,7 +46,7 @@ pub(super) static EFFECT: Effect = Effect {
 #[derive(Debug)]
 struct TorqueLowpass {
     values: [f64; 1],
-    /// Input and output of the sample before, by joint.
+    /// Input and output at the previous sample, by joint.
     state: Vec<(f64, f64)>,
     started: bool,
 }
@@ -84,7 +84,7 @@ impl Term for TorqueLowpass {
         }
         let steps = (TAU * self.values[0] * at.dt_s).max(0.0);
         let left = (-steps).exp();
-        // Share of a ramp over the step that has come through: 1 - (1 - e^-s) / s.
+        // Response to a ramp over the step, relative to the ramp: 1 - (1 - e^-s) / s.
         let ramp = if steps > 1e-4 {
             1.0 + (-steps).exp_m1() / steps
         } else {

@@ -1,4 +1,4 @@
-//! Effort that goes up and down with the joint's angle: cogging, gear teeth, eccentric gears.
+//! Effort that varies periodically with the joint's angle: cogging, gear teeth, eccentric gears.
 
 use std::f64::consts::PI;
 
@@ -8,7 +8,7 @@ use super::{
     Traits, Words,
 };
 
-/// Effort -A sin(n q + φ), searched as the factors of sin n q and cos n q. Of several waves each is a term.
+/// Effort -A sin(n q + φ), searched as the factors of sin n q and cos n q. Each of several waves is a separate term.
 pub(super) static EFFECT: Effect = Effect {
     name: "torque_ripple",
     words: Words::new(

@@ -1,4 +1,4 @@
-//! A sensor that cannot report more than so much.
+//! A sensor or drive with a limited range.
 
 use super::law::array;
 use super::{
@@ -6,7 +6,7 @@ use super::{
     Scale, Simulated, Term, Traits, Words,
 };
 
-/// Recorded effort: the true one, cut off at ± the limit.
+/// Recorded effort: the true one, limited to ± the limit.
 pub(super) static EFFECT: Effect = Effect {
     name: "torque_saturation",
     words: Words::new(
@@ -63,7 +63,7 @@ impl Term for TorqueSaturation {
 
     fn act(&mut self, _at: &MotionSample<'_>, effort: &mut [f64]) {
         let effort = &mut effort[self.joint];
-        // A negative limit, which a fit may try, cuts all off.
+        // A negative limit, which a fit may try, limits the effort to zero.
         let limit = self.values[0].max(0.0);
         *effort = effort.clamp(-limit, limit);
     }

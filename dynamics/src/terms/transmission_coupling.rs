@@ -1,4 +1,4 @@
-//! A joint whose transmission also feels another joint's effort, as in wrists.
+//! A joint whose transmission also carries another joint's effort, as in wrists.
 
 use super::law::array;
 use super::{
@@ -6,7 +6,7 @@ use super::{
     Simulated, Term, Traits, Words,
 };
 
-/// Recorded effort: τ + c τ of the driving joint, as it is before this term.
+/// Recorded effort: τ + c τ of the driving joint, each without this term.
 pub(super) static EFFECT: Effect = Effect {
     name: "transmission_coupling",
     words: Words::new(

@@ -1,30 +1,30 @@
-//! What a report calls an effect, and what it says of one that was found.
+//! Wording of an effect and of its findings in reports.
 
-/// The words for an effect. Sentences are templates: in `{}` stands `place`, `source` (the joint that drives it),
-/// `recording` (the one that it fills), or the name of a parameter, for its value with unit and interval; `{name:ratio}` leaves the unit out, and
-/// `{name:number}` the interval, too.
+/// Wording of an effect. Sentences are templates. A placeholder in `{}` is `place`, `source` (the joint that drives
+/// it), `recording` (the one that it fills), or the name of a parameter, which is replaced by its value with unit and
+/// interval. `{name:ratio}` omits the unit, and `{name:number}` also the interval.
 #[derive(Debug, Clone, Copy)]
 pub struct Words {
-    /// As a heading: `Coulomb friction`.
+    /// Heading: `Coulomb friction`.
     pub title: &'static str,
-    /// Within a sentence: `a payload`.
+    /// Noun phrase within a sentence: `a payload`.
     pub noun: &'static str,
-    /// What it means at the arm.
+    /// Physical meaning.
     pub meaning: &'static str,
-    /// What a mechanic looks at; `{place}` and `{source}` are filled in. Empty where there is nothing to mend.
+    /// Parts to inspect; `{place}` and `{source}` are replaced. Empty if there is nothing to repair.
     pub look_at: &'static str,
-    /// A finding.
+    /// Sentence of a finding.
     pub finding: &'static str,
-    /// A finding of less of it than a corrected twin says, `{less}` of it; for an effect that may fall below what is known.
+    /// Sentence of a finding that a corrected twin contains `{less}` too much of it.
     pub less: Option<&'static str>,
-    /// A finding whose first number may be zero; for an effect that takes all away then.
+    /// Sentence of a finding whose first parameter may be zero, which then removes the whole effort.
     pub nothing: Option<&'static str>,
-    /// A finding whose numbers the recordings do not determine, where their list is no help.
+    /// Sentence of a finding whose parameters the recordings do not determine, if a list of them would not help.
     pub without_numbers: Option<&'static str>,
 }
 
 impl Words {
-    /// Heading, noun, meaning, what to look at, and a finding.
+    /// Heading, noun, meaning, parts to inspect, and finding.
     pub const fn new(
         title: &'static str,
         noun: &'static str,
@@ -52,24 +52,24 @@ pub fn quantity(name: &str) -> String {
     stem.replace("com_", "centre_of_mass_").replace('_', " ")
 }
 
-/// How a value is told in a template.
+/// Format of a value in a template.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Told {
-    /// With unit and interval.
+    /// Value with unit and interval.
     Whole,
-    /// With its interval.
+    /// Value with its interval.
     Ratio,
-    /// By itself.
+    /// Value alone.
     Number,
 }
 
-/// The places of a template, in order: a name, and how its value is told.
+/// Placeholders of a template, in order: name and format of the value.
 pub fn places(template: &str) -> impl Iterator<Item = (&str, Told)> {
     let after_brace = template.split('{').skip(1);
     after_brace.filter_map(|rest| Some(place(rest.split_once('}')?.0)))
 }
 
-/// A template with its places filled.
+/// Replaces the placeholders of a template.
 pub fn fill(template: &str, value: impl Fn(&str, Told) -> String) -> String {
     let mut text = String::with_capacity(2 * template.len());
     let mut rest = template;
@@ -92,7 +92,7 @@ fn place(inner: &str) -> (&str, Told) {
     }
 }
 
-/// Endings of canonical names and the units they stand for, longer ones before those they end in.
+/// Suffixes of canonical names with their units; longer suffixes come before the shorter ones that they contain.
 const UNITS: [(&str, &str); 24] = [
     ("_nms2_per_rad2", "N m s²/rad²"),
     ("_nms_per_rad", "N m s/rad"),
@@ -120,7 +120,7 @@ const UNITS: [(&str, &str); 24] = [
     ("_a", "A"),
 ];
 
-/// Unit of a parameter and the rest of its name, from its canonical name; without a unit it is a pure number.
+/// Unit of a parameter and the rest of its canonical name; `None` for a pure number.
 pub const fn unit(name: &str) -> Option<(&str, &'static str)> {
     let mut i = 0;
     while i < UNITS.len() {

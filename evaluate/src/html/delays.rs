@@ -1,4 +1,4 @@
-//! How long after the beginning of a contact the alarm comes.
+//! Histograms of the delay from the beginning of a contact to the alarm.
 
 use maud::{Markup, html};
 use tauscope_report::chart::{Axis, Panel, r};
@@ -8,11 +8,11 @@ use crate::judged::Judged;
 use crate::metrics::Matched;
 use crate::metrics::statistics::{Distribution, quantile};
 
-/// How many bars a picture has.
+/// Number of bars of a histogram.
 /// Tuned: by eye, for the picture; no number depends on it.
 const BARS: usize = 24;
 
-/// A picture a detector, all to one scale; none if nobody has found anything.
+/// One histogram per detector, all to the same scale; `None` if no detector found a contact.
 pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
     let delays: Vec<Vec<f64>> = (judged.iter())
         .map(|judged| judged.matched().filter_map(|m| delay_ms(&m)).collect())
@@ -22,7 +22,7 @@ pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
         return None;
     }
     all.sort_by(f64::total_cmp);
-    // A few very late ones must not squeeze the others; they are in the last bar.
+    // A few very late alarms must not compress the scale; they are counted in the last bar.
     let width = round_up(quantile(&all, 0.95).max(1.0) / (BARS - 2) as f64);
     let counts: Vec<[usize; BARS]> = delays.iter().map(|delays| bars(delays, width)).collect();
     let most = counts.iter().flatten().copied().max().unwrap_or(1);
@@ -42,7 +42,7 @@ fn delay_ms(matched: &Matched<'_>) -> Option<f64> {
     Some(1e3 * matched.delay_s()?)
 }
 
-/// 1, 2 or 5 times a power of ten.
+/// Rounds up to 1, 2 or 5 times a power of ten.
 fn round_up(value: f64) -> f64 {
     let decade = 10_f64.powf(value.log10().floor());
     let steps = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * decade);
@@ -52,7 +52,7 @@ fn round_up(value: f64) -> f64 {
         .unwrap_or(value)
 }
 
-/// How many delays are in each bar; the first is for those before the labelled beginning.
+/// Counts the delays per bar. The first bar holds alarms before the labelled beginning.
 fn bars(delays_ms: &[f64], width: f64) -> [usize; BARS] {
     let mut counts = [0; BARS];
     for delay in delays_ms {

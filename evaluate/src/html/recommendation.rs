@@ -1,20 +1,20 @@
-//! Which detector to take, and why; and which of them is in alarm where nothing touches the robot.
+//! Recommended detector with its reason, and detectors that are often in alarm during contact-free time.
 
 use maud::{Markup, html};
 
 use crate::judged::Judged;
 use crate::metrics::Numbers;
 
-/// From this share of the contact-free time on an alarm that stays on is no alarm any more.
+/// Share of the contact-free time in alarm above which a detector is not recommended.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const ALWAYS_ON: f64 = 0.05;
-/// From this share on it must be said.
+/// Share of the contact-free time in alarm above which the page warns.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const OFTEN_ON: f64 = 0.01;
 
-/// The detector with the fewest mistakes: contacts that it missed and false alarms together, one as bad as the other; of
-/// equals the one that is in alarm for less time, then the faster one. One that is in alarm for long is none, unless all
-/// are. `None` where nothing was scored or no test recording holds a contact.
+/// Returns the detector with the fewest mistakes: missed contacts plus false alarms, with equal weight. Ties are
+/// resolved by the shorter time in alarm, then by the shorter delay. A detector above [`ALWAYS_ON`] is chosen only
+/// if all are. `None` if nothing was scored or no test recording holds a contact.
 pub(super) fn best<'a, 'b>(judged: &'b [Judged<'a>]) -> Option<&'b Judged<'a>> {
     let scored = judged.iter().filter(|j| !j.scored.is_empty());
     scored
@@ -26,7 +26,7 @@ pub(super) fn best<'a, 'b>(judged: &'b [Judged<'a>]) -> Option<&'b Judged<'a>> {
         })
 }
 
-/// What detectors are ordered by; the smallest is the best.
+/// Sort key of a detector; the smallest is the best.
 fn rank(judged: &Judged<'_>) -> (bool, f64, f64, f64) {
     let numbers = judged.first();
     let share = numbers.free_share_in_alarm;
@@ -39,14 +39,14 @@ fn rank(judged: &Judged<'_>) -> (bool, f64, f64, f64) {
     )
 }
 
-/// Mean over the seeds, for a net that does well with one seed may do badly with the next.
+/// Mean number of mistakes over the seeds, because the result of a neural network depends on its seed.
 fn mistakes(judged: &Judged<'_>) -> f64 {
     let of = |numbers: &Numbers| numbers.events - numbers.found + numbers.false_alarms;
     let sum: usize = judged.numbers.iter().map(of).sum();
     sum as f64 / judged.numbers.len() as f64
 }
 
-/// The recommendation in a sentence; every number in it is of the one detector.
+/// The recommendation in a sentence; all its numbers belong to the recommended detector.
 pub(super) fn sentence(judged: &[Judged<'_>]) -> String {
     let Some(best) = best(judged) else {
         return format!(
@@ -79,13 +79,13 @@ pub(super) fn sentence(judged: &[Judged<'_>]) -> String {
     )
 }
 
-/// Share of the contact-free time in alarm, and delay, of those that make as few mistakes.
+/// Share of the contact-free time in alarm, and delay: the criteria among detectors with equally few mistakes.
 fn share_and_delay(judged: &Judged<'_>) -> (f64, f64) {
     let (_, _, share, delay) = rank(judged);
     (share, delay)
 }
 
-/// Why the one with this share and delay is ahead of others that make as few mistakes.
+/// Reason why the detector with this share and delay ranks before others with equally few mistakes.
 fn ahead_of((share, delay): (f64, f64), alike: &[(f64, f64)]) -> String {
     let few = match alike.len() {
         0 => return "It makes the fewest mistakes:".to_owned(),
@@ -95,9 +95,9 @@ fn ahead_of((share, delay): (f64, f64), alike: &[(f64, f64)]) -> String {
     let why = if alike.iter().all(|other| share < other.0) {
         "is in alarm without contact for the least time of them"
     } else if alike.iter().all(|other| delay < other.1) {
-        "tells of contacts the soonest of them"
+        "has the shortest delay of them"
     } else {
-        "of those in alarm without contact for the least time it tells of contacts the soonest"
+        "of those in alarm without contact for the least time it has the shortest delay"
     };
     format!("It makes the fewest mistakes, {few}, and {why}:")
 }
@@ -117,7 +117,7 @@ fn said_of(numbers: &Numbers) -> String {
     )
 }
 
-/// How many false alarms, in which time, and what that allows to be said.
+/// Number of false alarms, contact-free time and the 95 % bound on the rate, in words.
 pub(super) fn false_alarms(numbers: &Numbers) -> String {
     let count = match numbers.false_alarms {
         0 => "no false alarm".to_owned(),
@@ -135,7 +135,7 @@ pub(super) fn false_alarms(numbers: &Numbers) -> String {
     )
 }
 
-/// Rounded up, so that it stays a bound: `36`, `0.4`.
+/// Formats an upper bound, rounded up: `36`, `0.4`.
 pub(super) fn bound_text(per_hour: f64) -> String {
     if per_hour >= 10.0 {
         format!("{:.0}", per_hour.ceil())
@@ -144,7 +144,7 @@ pub(super) fn bound_text(per_hour: f64) -> String {
     }
 }
 
-/// Detectors that are in alarm for long where nothing touches the robot: an alarm that never ends is one false alarm.
+/// Warning about detectors that are often in alarm without contact: an alarm that never ends is one false alarm.
 pub(super) fn flagged(judged: &[Judged<'_>]) -> Option<Markup> {
     let often = |judged: &&Judged<'_>| judged.first().free_share_in_alarm > OFTEN_ON;
     let mut flagged: Vec<&Judged<'_>> = judged.iter().filter(often).collect();
@@ -162,7 +162,7 @@ pub(super) fn flagged(judged: &[Judged<'_>]) -> Option<Markup> {
             p.rival {
                 b { "In alarm without contact for much of the time: " }
                 (all.join(", "))
-                ". An alarm that lasts counts as one false alarm, however long it is: read the counts of these with care."
+                ". A continuous alarm counts as one false alarm, however long it lasts: read the counts of these with care."
             }
         }
     })
@@ -179,7 +179,7 @@ mod tests {
         assert!(told(&[(0.02, 0.05)]).contains("as few as one other, and is in alarm"));
         assert!(
             told(&[(0.01, 0.1), (0.02, 0.1)])
-                .contains("2 others, and tells of contacts the soonest of them")
+                .contains("2 others, and has the shortest delay of them")
         );
         assert!(told(&[(0.01, 0.1), (0.02, 0.05)]).contains("of those in alarm"));
     }

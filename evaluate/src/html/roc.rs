@@ -7,18 +7,18 @@ use super::line_class;
 use crate::judged::Judged;
 use crate::metrics::samples::Labelled;
 
-/// About so many points a curve over its whole length.
+/// Approximate number of points of a whole curve.
 /// Resolution: about one per pixel; changes the page's size.
 const POINTS: usize = 400;
-/// About so many points a curve within what is enlarged.
+/// Approximate number of points of a whole curve from which the enlarged part is taken.
 /// Resolution: as above, over a twentieth of the range.
 const FINE: usize = 8000;
-/// Who lives with more false positives than this does not use the detector.
+/// Upper end of the enlarged false positive rates; no user accepts a higher rate.
 /// Tuned: by eye, for the picture; no number depends on it.
 const ZOOM: f64 = 0.05;
 
-/// One picture with a curve a detector, of the first seed; none if no test recording has both contact and
-/// free motion.
+/// One figure with a curve per detector, of the first seed; `None` if no test recording has both contact and free
+/// motion.
 pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
     let curves: Vec<_> = (judged.iter().enumerate())
         .map(|(index, judged)| (index, judged, samples(judged).roc(POINTS)))
@@ -58,7 +58,7 @@ pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
     })
 }
 
-/// Curves by detector up to a false positive rate.
+/// Draws the curves by detector up to a false positive rate.
 fn picture(curves: &[(usize, Vec<(f64, f64)>)], most: f64, what: &str) -> Markup {
     let panel = Panel {
         x: Axis::between(0.0, most, 56.0, 536.0),
@@ -76,7 +76,7 @@ fn picture(curves: &[(usize, Vec<(f64, f64)>)], most: f64, what: &str) -> Markup
     }
 }
 
-/// A curve up to [`ZOOM`], with its point there.
+/// The part of a curve up to [`ZOOM`], with its interpolated point there.
 fn zoomed(curve: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let within = curve.iter().copied().take_while(|(x, _)| *x <= ZOOM);
     let mut points: Vec<(f64, f64)> = within.collect();

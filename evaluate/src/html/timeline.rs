@@ -1,4 +1,4 @@
-//! The scores over time, recording by recording: what was labelled, what was found.
+//! Scores over time, one plot per recording, with labels and alarms.
 
 use maud::{Markup, html};
 use tauscope_dynamics::terms::words::counted;
@@ -8,22 +8,22 @@ use super::recommendation;
 use crate::judged::Judged;
 use crate::metrics::Scored;
 
-/// How many recordings are drawn.
+/// Largest number of recordings that are drawn.
 /// Tuned: by eye, for the layout of the page.
 const RECORDINGS: usize = 24;
-/// How many of them without a click.
+/// Number of plots that are initially open.
 /// Tuned: by eye, for the layout of the page.
 const OPEN: usize = 3;
-/// How many points a line has.
+/// Largest number of points of a line.
 /// Resolution: about one per pixel; changes the page's size.
 const POINTS: usize = 700;
-/// What is beyond so many thresholds stands at the upper end.
+/// Upper end of the score axis, in thresholds; higher scores are clipped.
 /// Tuned: by eye, for the picture; no number depends on it.
 const HIGHEST: f64 = 6.0;
-/// Class of the score's line: one colour for every detector, and none that alarms have.
+/// Style class of the score's line: the same colour for every detector, distinct from that of alarms.
 const SCORE: &str = "c0";
 
-/// A plot a recording, of the recommended detector; none if nothing was scored.
+/// One plot per recording, of the recommended detector; `None` if nothing was scored.
 pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
     let drawn = recommendation::best(judged).or_else(|| judged.first())?;
     if drawn.scored.is_empty() {
@@ -106,7 +106,7 @@ fn is_same(a: f64, b: f64) -> bool {
     (a - b).abs() < 1e-9
 }
 
-/// The largest score of each stretch of time, in thresholds.
+/// Downsamples scores to the maximum of each time interval, in thresholds.
 fn thinned(t: &[f64], scores: &[f64], threshold: f64) -> (Vec<f64>, Vec<f64>) {
     let scale = if threshold.abs() > 0.0 && threshold.is_finite() {
         threshold.abs()

@@ -1,4 +1,4 @@
-//! What the thresholds of a detector that was tuned trade against each other, on the recordings it was tuned on
+//! Trade-off curves over the thresholds of a tuned detector, on the recordings that it was tuned on
 //! (Salt Ducaju et al., section V).
 
 use maud::{Markup, html};
@@ -20,21 +20,21 @@ const BOTTOM: f64 = 240.0;
 /// Tuned: by eye, for the picture; no number depends on it.
 const TOP: f64 = 26.0;
 
-/// The curves of every detector that was tuned by some; none if there is none.
+/// Curves of every tuned detector; `None` if no detector was tuned.
 pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
     let tuned: Vec<(&Judged<'_>, &Sweeps)> = (judged.iter())
         .filter_map(|judged| Some((judged, judged.run.first().sweeps.as_ref()?)))
         .collect();
     (!tuned.is_empty()).then(|| {
         html! {
-            p.lead { "What other thresholds would have done to the recordings that these were tuned on. Dashed: the tuned one." }
+            p.lead { "Results that other thresholds would have given on the tuning recordings. Dashed: the tuned threshold." }
             @for (judged, sweeps) in &tuned {
                 div.card {
                     h3 { (judged.label) }
                     p.muted {
                         "F" sub { "th" } " = " (format!("{:.2} N", sweeps.force_threshold_n))
-                        ": above it the force's content of the band is a contact. γ = " (format!("{:.1}", sweeps.bound))
-                        ": from it on a force points elsewhere than the motion, and is a cooperation."
+                        ": above it the force content of the band is a contact. γ = " (format!("{:.1}", sweeps.bound))
+                        ": at or above it the force direction differs from that of the motion, and the contact is a cooperation."
                     }
                     div.scatters {
                         @if let Some(picture) = delays(sweeps) { (picture) }
@@ -51,7 +51,7 @@ fn thresholds(sweep: &[ThresholdSweep]) -> Vec<f64> {
     sweep.iter().map(|at| at.force_threshold_n).collect()
 }
 
-/// A picture over `F_th` with some lines: name, class and values.
+/// Draws lines, given by name, class and values, over `F_th`.
 fn over_threshold(
     sweeps: &Sweeps,
     (title, y_name): (&str, &str),
@@ -96,7 +96,7 @@ fn counts(sweeps: &Sweeps) -> Option<Markup> {
         sweep.iter().map(|at| of(at).missed as f64).collect()
     };
     let (collisions, cooperations) = (missed(|at| &at.collisions), missed(|at| &at.cooperations));
-    // Thresholds within the noise give false alarms without end, which would squeeze all else.
+    // Thresholds within the noise would cause false alarms without limit and dominate the scale.
     let most = collisions.iter().chain(&cooperations).copied();
     let most = most.fold(5.0, f64::max);
     let false_alarms = (sweep.iter())
@@ -125,13 +125,13 @@ fn kinds(sweeps: &Sweeps) -> Option<Markup> {
         x: Axis::between(0.0, 100.0, LEFT, RIGHT),
         y: Axis::between(0.0, 100.0, BOTTOM, TOP),
     };
-    // The bounds on either side of γ tell the same contacts.
+    // The sweep's bounds on either side of γ separate the contacts in the same way.
     let tuned = sweep.iter().find(|at| at.bound >= gamma).or(sweep.last())?;
     Some(html! {
         figure {
             figcaption { b { "Collision or cooperation" } }
             svg.plot viewBox="0 0 400 282" role="img" aria-label="sensitivity against specificity" {
-                (panel.frame(5, 5, Some("Specificity: collisions told right [%]"), "Sensitivity: cooperations told right [%]"))
+                (panel.frame(5, 5, Some("Specificity: collisions classified right [%]"), "Sensitivity: cooperations classified right [%]"))
                 (panel.line("line own c2", &specificity, &sensitivity))
                 circle.tuned.c2 cx=(r(panel.x.px(percent(tuned.specificity)))) cy=(r(panel.y.px(percent(tuned.sensitivity)))) r="5" {}
             }

@@ -6,7 +6,7 @@ use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::suggest;
 use tauscope_pipeline::yaml::{Located, Place};
 
-/// What the set says of its arm; without a robot the joints are those of the first recording.
+/// Builds the cell of a set; without a robot the joints are those of the first recording.
 ///
 /// # Errors
 /// If the robot, the joints or the torque constants cannot be used.
@@ -21,7 +21,7 @@ pub fn cell(
     let unit = set.effort_unit;
     let Some(robot) = &set.robot else {
         if set.tool_link.is_some() {
-            notes.push("`tool_link` counts for nothing: the set names no `robot`".to_owned());
+            notes.push("`tool_link` has no effect: the set names no `robot`".to_owned());
         }
         let joints = joint_names(file)?;
         return Cell::from_joints(String::new(), joints, unit, &constants, &problem);
@@ -38,7 +38,7 @@ pub fn cell(
     }
     cell.facts.tool = set.tool_link.clone().map(|link| ToolEntry {
         link,
-        // What it weighs is in the URDF.
+        // The URDF contains its mass.
         mass_kg: 0.0,
         com_m: [0.0; 3],
         inertia_kgm2: [0.0; 6],

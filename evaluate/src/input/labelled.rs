@@ -1,4 +1,4 @@
-//! What a set's labels say, and what they leave out or name that is not there.
+//! Labels of a set, and their inconsistencies with the set and the robot.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,7 +13,7 @@ use tauscope_pipeline::yaml::{Located, Place};
 use crate::labels::{self, LabelsFile};
 use crate::recording::{Named, Role};
 
-/// `labels:` in the file, else `labels.json`, else `labels_train.json` beside it.
+/// Reads the labels from the file under `labels:`, else `labels.json`, else `labels_train.json` next to the set.
 pub fn find(
     file: &Located<SetFile>,
     notes: &mut Vec<String>,
@@ -49,8 +49,8 @@ pub fn find(
     }
 }
 
-/// What the reader should know of the labels: who is in them and not in the set, or the other way round, and which
-/// links the robot does not have.
+/// Notes on the labels: recordings that are only in the labels or only in the set, and links that the robot does not
+/// have.
 pub fn doubts(labels: Option<&LabelsFile>, recordings: &[Named], cell: &Cell) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(labels) = labels {

@@ -1,4 +1,4 @@
-//! Behind which twins a set is evaluated.
+//! Choice of the twins behind which a set is evaluated.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use tauscope_twin::TwinFile;
 
 use super::{TwinChoice, TwinSource};
 
-/// Those that `names` asks for, or the usual one.
+/// Returns the twins that `names` lists, or the default twin.
 pub fn choices(
     file: &Located<SetFile>,
     cell: &Cell,
@@ -31,7 +31,7 @@ pub fn choices(
     let usual = if set.topics.twin.is_some() {
         "topic"
     } else if set.impedance.is_some() && cell.facts.effort_unit == EffortUnit::Nm {
-        // An arm under impedance control feels torque behind its gears: friction would be all that a gain takes up.
+        // An arm under impedance control measures torque behind its gears: a fitted gain would only absorb friction.
         "rigid"
     } else {
         "regression"
@@ -63,7 +63,7 @@ pub fn choices(
             },
         };
         let path = Path::new(name);
-        // `explain` calls all of them twin.yaml: then the folder tells them apart.
+        // `explain` names every twin twin.yaml, so only the folder distinguishes them.
         let mut short = match &source {
             TwinSource::File(_) if stem(path) == "twin" => {
                 path.parent().and_then(Path::file_name).map_or_else(

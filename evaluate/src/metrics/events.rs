@@ -1,58 +1,58 @@
-//! Detections against true events.
+//! Matching of detections to labelled events.
 
 use tauscope_pipeline::tally::Event;
 
 use crate::labels::{TrueEvent, Truth};
 
-/// A detection this much before an event may still be of it: labels are not more exact \[s\].
+/// Tolerance before an event: an earlier detection may still match it, because labels are not more exact \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const TOLERANCE_S: f64 = 0.02;
-/// A detection this long after an event's end may still be of it: filters are slow \[s\].
+/// Tolerance after an event's end: a later detection may still match it, because filters are slow \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const AFTER_S: f64 = 0.15;
-/// A false alarm within this time of the last counted one counts no more \[s\].
+/// Time after a counted false alarm in which further ones are not counted \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const MERGE_S: f64 = 0.25;
-/// A labelled length may exceed the last stamp by so much: a period, or a rounding \[s\].
+/// Largest excess of a labelled length over the last stamp, due to a sample period or rounding \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const LAST_S: f64 = 0.5;
-/// Grid on which the time in alarm is counted \[s\].
-/// Resolution: a time in alarm is told to 10 ms an alarm.
+/// Grid step for the time in alarm \[s\].
+/// Resolution: the time in alarm is accurate to 10 ms per alarm.
 const GRID_S: f64 = 0.01;
 
-/// A true event and the detection that found it.
+/// A labelled event and the detection that found it.
 #[derive(Debug, Clone, Copy)]
 pub struct Matched<'a> {
-    /// What happened.
+    /// The labelled event.
     pub event: &'a TrueEvent,
-    /// What was said of it first.
+    /// The first detection of the event; `None` if it was missed.
     pub detection: Option<&'a Event>,
 }
 
 impl Matched<'_> {
-    /// From the beginning to the alarm \[s\].
+    /// Delay from the beginning to the alarm \[s\].
     pub fn delay_s(&self) -> Option<f64> {
         Some(self.detection?.t - self.event.t_on)
     }
 }
 
-/// What came of one recording's detections.
+/// Detections of one recording matched to its labelled events.
 #[derive(Debug, Clone)]
 pub struct Matching<'a> {
-    /// All events but the ignored, in the order of their beginnings.
+    /// All events except ignored ones, in the order of their beginnings.
     pub events: Vec<Matched<'a>>,
-    /// Detections of nothing.
+    /// Detections that match no event.
     pub false_alarms: Vec<&'a Event>,
-    /// How many detections begin outside every labelled contact, nothing forgiven: no tolerance before and behind a
-    /// contact, no recovery time, none merged.
+    /// Number of detections that begin outside every labelled contact, without tolerance before and after a contact,
+    /// recovery time or merging.
     pub strict_false_alarms: usize,
 }
 
 impl<'a> Matching<'a> {
-    /// A detection belongs to the latest-starting event that lasts at the alarm's instant, widened by [`TOLERANCE_S`]
-    /// before and [`AFTER_S`] behind. The first of an event is its hit, later ones count for nothing. One that belongs to no
-    /// event is a false alarm, unless it comes within `recovery_s` of the end of one, or within [`MERGE_S`] of the
-    /// last false alarm that was counted.
+    /// Matches detections to events. A detection belongs to the latest-starting event that contains the alarm's
+    /// stamp, where events are extended by [`TOLERANCE_S`] before and [`AFTER_S`] after. The first detection of an
+    /// event finds it; later ones are not counted. A detection of no event is a false alarm, unless it comes within
+    /// `recovery_s` of an event's end, or within [`MERGE_S`] of the last counted false alarm.
     pub fn of(truth: &'a Truth, detections: &'a [Event], recovery_s: f64) -> Self {
         let mut events: Vec<Matched<'a>> = (truth.events.iter())
             .map(|event| Matched {
@@ -97,7 +97,7 @@ impl<'a> Matching<'a> {
     }
 }
 
-/// Time in alarm outside contacts, and all time outside contacts \[s\], on a grid of 10 ms.
+/// Time in alarm outside contacts, and total time outside contacts \[s\], on a grid of 10 ms.
 pub fn in_alarm(truth: &Truth, duration_s: f64, detections: &[Event]) -> (f64, f64) {
     let count = (duration_s / GRID_S).ceil().max(0.0) as usize;
     let (mut alarm, mut free) = (0_u64, 0_u64);
@@ -113,7 +113,7 @@ pub fn in_alarm(truth: &Truth, duration_s: f64, detections: &[Event]) -> (f64, f
     (alarm as f64 * GRID_S, free as f64 * GRID_S)
 }
 
-/// Length of a recording \[s\]: as the labels have it, unless its samples end before.
+/// Length of a recording \[s\]: the labelled length, unless the samples end before it.
 pub fn duration_s(truth: &Truth, last_s: f64) -> f64 {
     let labelled = truth
         .duration
@@ -121,8 +121,8 @@ pub fn duration_s(truth: &Truth, last_s: f64) -> f64 {
     labelled.unwrap_or(last_s)
 }
 
-/// Contact-free time of a recording \[s\]: its length less the part of it in which something is labelled. What came on
-/// top of another contact (`during`) is taken off on its own.
+/// Contact-free time of a recording \[s\]: its length minus the union of its labelled contacts. A contact on top of
+/// another one (`during`) is subtracted on its own.
 pub fn free_s(truth: &Truth, duration_s: f64) -> f64 {
     let within = |event: &TrueEvent| (event.t_on.max(0.0), event.t_off.min(duration_s));
     let (on_top, plain): (Vec<&TrueEvent>, Vec<&TrueEvent>) =

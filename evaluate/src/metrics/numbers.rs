@@ -1,4 +1,4 @@
-//! What a detector did on some recordings, in numbers.
+//! Performance figures of a detector over recordings.
 
 use serde::Serialize;
 
@@ -11,13 +11,13 @@ use crate::runner::{Output, Runner};
 /// One recording's output against its labels.
 #[derive(Debug, Clone)]
 pub struct Scored<'a> {
-    /// The output.
+    /// The detector's output.
     pub output: &'a Output,
-    /// Its events against the labels.
+    /// Its events matched to the labels.
     pub matching: Matching<'a>,
-    /// Its samples against the labels.
+    /// Its scores with the label of each sample.
     pub samples: Labelled,
-    /// The same of its windows, for a detector that judges windows.
+    /// Its scores with the label of each window, for a detector that judges windows.
     pub windows: Option<Labelled>,
     /// Whether the recording holds any event.
     pub eventful: bool,
@@ -30,7 +30,7 @@ pub struct Scored<'a> {
 }
 
 impl<'a> Scored<'a> {
-    /// `output` of a detector that judges `window` samples at once; `None` without labels.
+    /// Scores `output` of a detector that judges windows of `window` samples; `None` without labels.
     pub fn of(request: &'a Request, output: &'a Output, window: Option<usize>) -> Option<Self> {
         let mut recordings = request.recordings.iter();
         let recording = recordings.find(|recording| recording.name == output.recording)?;
@@ -58,18 +58,18 @@ impl<'a> Scored<'a> {
     }
 }
 
-/// Sample-wise numbers; NaN where there is no contact, or nothing else.
+/// Figures per sample; NaN if there is no contact or no contact-free sample.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SampleNumbers {
-    /// How many samples (or windows) were scored.
+    /// Number of scored samples (or windows).
     pub count: usize,
     /// Share of them that are in a contact.
     pub contact_share: f64,
-    /// At the detector's threshold.
+    /// F1 at the detector's threshold.
     pub f1: f64,
-    /// The best over mean + i standard deviations of the validation scores.
+    /// Best F1 over thresholds at mean + i standard deviations of the validation scores.
     pub best_f1: f64,
-    /// Its i.
+    /// The i of the best F1.
     pub best_sigmas: f64,
     /// Area under the receiver operating characteristic.
     pub auc: f64,
@@ -91,53 +91,53 @@ impl SampleNumbers {
     }
 }
 
-/// All numbers.
+/// All performance figures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Numbers {
-    /// Sample by sample.
+    /// Figures per sample.
     pub samples: SampleNumbers,
-    /// Window by window, for a detector that judges windows.
+    /// Figures per window, for a detector that judges windows.
     pub windows: Option<SampleNumbers>,
-    /// True events.
+    /// Number of labelled events.
     pub events: usize,
-    /// Those that were found.
+    /// Number of events that were found.
     pub found: usize,
-    /// Alarms in all: also those that came again while an event lasted, or in the recovery time after one.
+    /// Number of all alarms, including repetitions during an event and those in the recovery time after one.
     pub alarms: usize,
-    /// Detections of nothing.
+    /// Number of detections that match no event.
     pub false_alarms: usize,
-    /// The same per hour of contact-free time.
+    /// False alarms per hour of contact-free time.
     pub false_alarms_per_hour: f64,
-    /// The rate is below this with 95 % confidence (Poisson) \[1/h\].
+    /// One-sided 95 % upper bound on the rate of false alarms (Poisson) \[1/h\].
     pub false_alarms_per_hour_bound: f64,
-    /// Alarms that begin outside every labelled contact, nothing forgiven: no tolerance, no recovery time, none merged.
+    /// Number of alarms that begin outside every labelled contact, without tolerance, recovery time or merging.
     pub strict_false_alarms: usize,
-    /// The same per hour of contact-free time.
+    /// Strict false alarms per hour of contact-free time.
     pub strict_false_alarms_per_hour: f64,
     /// Contact-free time \[h\].
     pub free_hours: f64,
     /// Share of the contact-free time in alarm.
     pub free_share_in_alarm: f64,
-    /// From beginning to alarm \[s\].
+    /// Delay from beginning to alarm \[s\].
     pub delay_s: Distribution,
-    /// Events whose link is known.
+    /// Number of events with a labelled link.
     pub links: usize,
-    /// Those whose link was named.
+    /// Number of these whose link was reported first.
     pub link_exact: usize,
-    /// Those for which it or a neighbour was named.
+    /// Number of these for which the link or a neighbour was reported first.
     pub link_within_one: usize,
-    /// Those for which one link was told and no other, and those of them where it was right.
+    /// Number of these for which exactly one link was reported.
     pub link_alone: usize,
-    /// See above.
+    /// Number of these for which exactly one link was reported, and it was right.
     pub link_alone_exact: usize,
-    /// Those whose link was told, alone or as one of two.
+    /// Number of these whose link was reported, alone or as one of two.
     pub link_told: usize,
     /// Angle between the true and the estimated force \[deg\].
     pub force_error_deg: Distribution,
 }
 
 impl Numbers {
-    /// Of a detector over these recordings.
+    /// Computes the figures of a detector over these recordings.
     pub fn of(request: &Request, runner: &Runner, scored: &[&Scored<'_>]) -> Self {
         let together = |part: &dyn Fn(&Scored<'_>) -> Option<Labelled>| {
             let mut all = Labelled::default();
@@ -206,11 +206,11 @@ impl Numbers {
     }
 }
 
-/// The links that were told of a contact whose link is known.
+/// Links reported for a contact whose link is labelled.
 struct ToldLinks {
-    /// One link was told, and no other.
+    /// Exactly one link was reported.
     is_alone: bool,
-    /// The touched one is among them.
+    /// The touched link is among them.
     is_right: bool,
 }
 

@@ -1,30 +1,30 @@
-//! Scores sample by sample: F1, the best of the thresholds of Tajiri and Iwamoto's section IV-C, and AUC.
+//! Figures per sample: F1, best F1 over the thresholds of Tajiri and Iwamoto, section IV-C, and AUC.
 
 use std::cmp::Ordering;
 
 use crate::labels::Truth;
 
-/// Scores and whether each is a positive.
+/// Scores with their labels.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Labelled {
     /// The scores.
     pub scores: Vec<f64>,
-    /// Whether something touched the robot.
+    /// Whether each score is of a contact.
     pub positive: Vec<bool>,
 }
 
-/// How a sample counts.
+/// Label of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Flag {
-    /// Nothing touches the robot.
+    /// Contact-free.
     Free,
-    /// Something does.
+    /// In contact.
     Contact,
-    /// Something does, too weakly to be counted either way.
+    /// In a contact too weak to be scored.
     Ignored,
 }
 
-/// How the samples of a recording count.
+/// Labels the samples of a recording.
 pub fn flags(t: &[f64], truth: &Truth) -> Vec<Flag> {
     let mut flags = vec![Flag::Free; t.len()];
     for event in &truth.events {
@@ -42,7 +42,7 @@ pub fn flags(t: &[f64], truth: &Truth) -> Vec<Flag> {
 }
 
 impl Labelled {
-    /// Takes a recording's samples, without those that are ignored.
+    /// Adds a recording's samples, except ignored ones.
     pub fn add(&mut self, scores: &[f64], flags: &[Flag]) {
         for (score, flag) in scores.iter().zip(flags) {
             if *flag != Flag::Ignored {
@@ -52,8 +52,8 @@ impl Labelled {
         }
     }
 
-    /// Takes a recording's windows of `length` samples, each at its last sample: a window is positive if any of
-    /// its samples is, and left out if it has an ignored one and none that is.
+    /// Adds a recording's windows of `length` samples, with the score at their last sample. A window is positive if
+    /// any of its samples is. A window without a positive sample is left out if it contains an ignored one.
     pub fn add_windows(&mut self, scores: &[f64], flags: &[Flag], length: usize) {
         let windows = flags.windows(length.max(1));
         for (score, window) in scores.iter().skip(length.max(1) - 1).zip(windows) {
@@ -74,8 +74,8 @@ impl Labelled {
         self.positive.iter().filter(|positive| **positive).count()
     }
 
-    /// Harmonic mean of precision and recall at a threshold, equal scores counting as alarms; NaN without
-    /// positives.
+    /// F1, the harmonic mean of precision and recall, at a threshold; a score at the threshold is an alarm. NaN
+    /// without positives.
     pub fn f1(&self, threshold: f64) -> f64 {
         let (mut hits, mut alarms) = (0_u64, 0_u64);
         for (score, positive) in self.scores.iter().zip(&self.positive) {
@@ -103,7 +103,7 @@ impl Labelled {
     }
 
     /// Area under the receiver operating characteristic: the probability that a positive scores higher than a
-    /// negative, ties counting half; NaN without either.
+    /// negative, with ties counted half; NaN without positives or without negatives.
     pub fn auc(&self) -> f64 {
         let positives = self.positives() as f64;
         let negatives = self.positive.len() as f64 - positives;
@@ -118,14 +118,14 @@ impl Labelled {
         area / (positives * negatives)
     }
 
-    /// Positives and negatives of each score, from the highest to the lowest.
+    /// Numbers of positives and negatives at each distinct score, from the highest to the lowest.
     fn steps(&self) -> Vec<(f64, f64)> {
         let mut order: Vec<usize> = (0..self.scores.len()).collect();
         order.sort_unstable_by(|a, b| self.scores[*b].total_cmp(&self.scores[*a]));
         let mut steps: Vec<(f64, f64)> = Vec::new();
         let mut before = f64::NAN;
         for index in order {
-            // The same score, or the other zero.
+            // A tie must share one step; the comparison also treats 0 and -0 as equal.
             if self.scores[index].partial_cmp(&before) != Some(Ordering::Equal) {
                 steps.push((0.0, 0.0));
                 before = self.scores[index];
@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn auc_counts_ties_half() {
-        // Pairs: (3 over 1), (3 over 2), (2 over 1), and 2 beside 2: 3.5 of 4.
+        // Pairs: (3 over 1), (3 over 2), (2 over 1), and a tie of 2 and 2: 3.5 of 4.
         let some = labelled(&[3.0, 2.0, 2.0, 1.0], &[1, 1, 0, 0]);
         let is = |labelled: Labelled, auc: f64| assert!((labelled.auc() - auc).abs() < 1e-15);
         is(some, 3.5 / 4.0);

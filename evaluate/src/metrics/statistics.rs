@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-/// A distribution in a few numbers; NaN where there is nothing.
+/// Summary of a distribution; NaN without values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Distribution {
-    /// How many.
+    /// Number of values.
     pub count: usize,
     /// Mean.
     pub mean: f64,
@@ -22,7 +22,7 @@ pub struct Distribution {
 }
 
 impl Distribution {
-    /// Of these values.
+    /// Summarises these values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut sorted: Vec<f64> = values.into_iter().collect();
         sorted.sort_by(f64::total_cmp);
@@ -39,7 +39,7 @@ impl Distribution {
     }
 }
 
-/// Mean and standard deviation over n; NaN of nothing.
+/// Mean and standard deviation over n; NaN without values.
 pub fn mean_sd(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -47,8 +47,7 @@ pub fn mean_sd(values: &[f64]) -> (f64, f64) {
     (mean, (squares / n).sqrt())
 }
 
-/// The value below which this share of `sorted` lies, between two neighbours by a straight line; NaN of
-/// nothing.
+/// Quantile of `sorted`, linearly interpolated between neighbours; NaN without values.
 pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else {
         return f64::NAN;
@@ -58,14 +57,16 @@ pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[below] + (at - at.floor()) * (sorted[above] - sorted[below])
 }
 
-/// The largest mean of a Poisson distribution under which so few or fewer events still come in one of 20 cases: an upper
-/// bound at 95 %, one-sided (Garwood, "Fiducial limits for the Poisson distribution", 1936).
+/// One-sided 95 % upper bound on the mean of a Poisson distribution, given an observed count: the mean at which
+/// `count` or fewer events have a probability of 0.05 (Garwood, "Fiducial limits for the Poisson distribution",
+/// 1936).
 pub fn poisson_bound_95(count: usize) -> f64 {
     /// Statistical: one of 20.
     const RARE: f64 = 0.05;
     /// Resolution: a float has 53 bits.
     const HALVINGS: usize = 60;
-    // Of so few or fewer events, by its logarithm, for e^-mean may be too small for a float.
+    // Cumulative probability of `count` or fewer events. The terms are computed as logarithms because e^-mean may
+    // underflow.
     let so_few = |mean: f64| {
         let (mut log_term, mut sum) = (-mean, (-mean).exp());
         for k in 1..=count {

@@ -1,4 +1,4 @@
-//! What is odd in the recordings of a set taken together.
+//! Irregularities of the recordings of a set taken together.
 
 use std::collections::BTreeMap;
 
@@ -9,16 +9,16 @@ use crate::input::Request;
 use crate::recording::{Named, Role};
 use crate::twin::is_free;
 
-/// What is learnt from less contact-free time than this is a guess \[s\].
+/// Contact-free time below which learning is reported as unreliable \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LITTLE_S: f64 = 5.0;
-/// A joint that goes less far than this within a recording stands still \[rad or m\].
+/// Range of positions in a recording below which a joint is at rest \[rad or m\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const STILL: f64 = 0.002;
-/// One that goes farther than this moves \[rad or m\].
+/// Range of positions in a recording above which a joint moves \[rad or m\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MOVES: f64 = 0.1;
-/// A rate may differ from the nominal one, and the train recordings' length from that of their cycles, by this share.
+/// Relative tolerance of a rate from the nominal one, and of the train recordings' length from that of their cycles.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const DIFFERS: f64 = 0.05;
 
@@ -28,26 +28,26 @@ struct OfRole {
     recordings: usize,
     /// Length \[s\].
     length_s: f64,
-    /// Time in which nothing touches the robot and the twin's filters have settled \[s\].
+    /// Contact-free time in which the twin's filters have settled \[s\].
     free_s: f64,
-    /// How far each joint goes within a recording, at most \[rad or m\].
+    /// Largest range of positions of each joint within a recording \[rad or m\].
     travel: Vec<f64>,
 }
 
-/// What only all recordings together tell.
+/// Sums over all recordings.
 #[derive(Debug, Default)]
 pub struct Totals {
     train: OfRole,
     validation: OfRole,
     test: OfRole,
-    /// By recording \[Hz\].
+    /// Sample rates by recording \[Hz\].
     rates_hz: Vec<(String, f64)>,
-    /// By joint, the recordings in which its effort never changes.
+    /// Recordings in which the effort of a joint never changes, by joint.
     constant: BTreeMap<usize, Vec<String>>,
 }
 
 impl Totals {
-    /// Takes the samples of a recording.
+    /// Adds the samples of a recording.
     pub fn add(&mut self, recording: &Named, samples: &[TwinState]) {
         let [Some(first), Some(last)] = [samples.first(), samples.last()] else {
             return;
@@ -83,7 +83,7 @@ impl Totals {
         }
     }
 
-    /// What the reader should know.
+    /// Remarks for the reader.
     pub fn notes(&self, request: &Request) -> Vec<String> {
         let names = &request.cell.facts.joint_names;
         let mut notes = Vec::new();
@@ -161,7 +161,7 @@ impl Totals {
     }
 }
 
-/// From the smallest to the largest.
+/// Difference between the largest and the smallest value.
 fn range(values: impl Iterator<Item = f64>) -> f64 {
     let ends = values.fold(
         (f64::INFINITY, f64::NEG_INFINITY),
@@ -170,7 +170,7 @@ fn range(values: impl Iterator<Item = f64>) -> f64 {
     ends.1 - ends.0
 }
 
-/// By the median of the steps, so that gaps do not count \[Hz\].
+/// Sample rate \[Hz\], from the median time step, which is robust to gaps.
 fn rate_hz(samples: &[TwinState]) -> Option<f64> {
     let stamps = samples.windows(2);
     let mut steps_ns: Vec<i64> = stamps

@@ -11,7 +11,7 @@ const CONTACT: &str = "contact";
 const COLLISION: &str = "collision";
 const COOPERATION: &str = "cooperation";
 
-/// Their tables, if the labels and some detector tell the two apart.
+/// Tables of the two kinds, if both the labels and at least one detector distinguish them.
 pub fn tables(judged: &[Judged<'_>]) -> Vec<Table> {
     let telling: Vec<&Judged<'_>> = judged.iter().filter(|j| j.tells_kinds()).collect();
     let labelled = |kind| {
@@ -27,7 +27,7 @@ pub fn tables(judged: &[Judged<'_>]) -> Vec<Table> {
     tables
 }
 
-/// The events that the tables count: not the collisions on top of a cooperation, as in the paper.
+/// Events that the tables count: all except collisions on top of a cooperation, as in the paper.
 fn counted<'a>(judged: &Judged<'a>) -> Vec<Matched<'a>> {
     let on_top = |matched: &Matched<'_>| {
         matched.event.kind == COLLISION && matched.event.during.as_deref() == Some(COOPERATION)
@@ -38,7 +38,7 @@ fn counted<'a>(judged: &Judged<'a>) -> Vec<Matched<'a>> {
         .collect()
 }
 
-/// How many found events of one kind were told to be of another.
+/// Number of found events of kind `truly` that were classified as `said`.
 fn told(matched: &[Matched<'_>], truly: &str, said: &str) -> usize {
     let found = |m: &&Matched<'_>| {
         m.event.kind == truly && m.detection.is_some_and(|detection| detection.kind == said)
@@ -54,7 +54,7 @@ fn missed(matched: &[Matched<'_>], truly: &str) -> usize {
 fn confusion(judged: &[&Judged<'_>]) -> Table {
     let mut table = Table::new(
         "Collision or cooperation (Salt Ducaju et al., table I)",
-        "Found events; collisions on top of a cooperation are left out, as in the paper. Specificity: collisions told right; sensitivity: cooperations told right; \"of all\" counts missed events as wrong.",
+        "Found events; collisions on top of a cooperation are left out, as in the paper. Specificity: collisions classified right; sensitivity: cooperations classified right; \"of all\" counts missed events as wrong.",
         &[
             "detector",
             "collision: right",
@@ -158,13 +158,13 @@ fn operators(judged: &Judged<'_>) -> Option<Table> {
 fn delays(judged: &[&Judged<'_>]) -> Table {
     let mut table = Table::new(
         "Detection times by kind and context",
-        "Context: what the contact came on top of. \"all\" leaves out collisions on top of a cooperation, as table I does.",
+        "Context: the contact during which it began. \"all\" leaves out collisions on top of a cooperation, as table I does.",
         &[
             "detector",
             "kind",
             "context",
             "found",
-            "told right",
+            "classified right",
             "delay [ms]",
             "p95",
         ],
@@ -186,7 +186,7 @@ fn delays(judged: &[&Judged<'_>]) -> Table {
     table
 }
 
-/// A row, if there are such contacts.
+/// Row of a kind and context, if there are such contacts.
 fn delay(
     judged: &Judged<'_>,
     kind: &str,

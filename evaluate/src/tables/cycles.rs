@@ -10,7 +10,7 @@ use crate::metrics::statistics::Distribution;
 const BASIC: &str = "virtual_collision_sensor_basic";
 const ADAPTIVE: &str = "virtual_collision_sensor";
 
-/// Which events a row is of.
+/// Events that a row covers.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 enum Group {
     Place(Option<String>, Option<String>),
@@ -40,7 +40,7 @@ impl Group {
     }
 }
 
-/// Their tables, if the labels tell of materials, motions or zones.
+/// Tables of the paper, if the labels name materials, motions or zones.
 pub fn tables(request: &Request, judged: &[Judged<'_>]) -> Vec<Table> {
     let mut groups: Vec<Group> = Vec::new();
     for matched in judged.iter().flat_map(Judged::matched) {
@@ -78,7 +78,7 @@ fn detector(judged: &Judged<'_>, groups: &[Group], joints: &[String]) -> Table {
             "Detection times and detecting axes, {} (Indri et al., tables 1 to 4)",
             judged.label
         ),
-        "Axes: in how many of the found collisions each joint detected.",
+        "Axes: number of found collisions that each joint detected.",
         &["test", "found", "DT [ms]", "p95 [ms]"],
     );
     table
@@ -103,7 +103,7 @@ fn detector(judged: &Judged<'_>, groups: &[Group], joints: &[String]) -> Table {
     table
 }
 
-/// What adaptation gains, behind each twin.
+/// Reduction of the detection time by adaptation, behind each twin.
 fn reduction(judged: &[Judged<'_>], groups: &[Group]) -> Option<Table> {
     let mut table = Table::new(
         "From the basic to the adaptive virtual collision sensor (table 1)",

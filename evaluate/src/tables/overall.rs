@@ -1,4 +1,4 @@
-//! Tables of all detectors beside each other.
+//! Tables that compare all detectors.
 
 use tauscope_detect::Training;
 
@@ -10,7 +10,7 @@ use crate::metrics::events::MERGE_S;
 use crate::metrics::numbers::SampleNumbers;
 use crate::recording::Role;
 
-/// The twins, joint by joint: Tajiri and Iwamoto's equations 9 and 10.
+/// Gain, offset and noise of the twins by joint: Tajiri and Iwamoto, equations 9 and 10.
 pub fn twins(evaluation: &Evaluation) -> Table {
     let facts = &evaluation.request.cell.facts;
     let unit = facts.effort_unit.as_str();
@@ -59,7 +59,7 @@ pub fn twins(evaluation: &Evaluation) -> Table {
     table
 }
 
-/// Tajiri and Iwamoto, table II.
+/// Figures per sample: Tajiri and Iwamoto, table II.
 pub fn samples(judged: &[Judged<'_>]) -> Table {
     let share = judged
         .first()
@@ -113,7 +113,7 @@ pub fn samples(judged: &[Judged<'_>]) -> Table {
     table
 }
 
-/// The same of the window methods' own labels.
+/// Figures per window, for the detectors that judge windows.
 pub fn windows(judged: &[Judged<'_>]) -> Option<Table> {
     let mut table = Table::new(
         "Window by window",
@@ -198,11 +198,11 @@ pub fn events(judged: &[Judged<'_>], recovery_s: f64) -> Table {
     table
 }
 
-/// Which link, and from where.
+/// Estimated link and force direction.
 pub fn places(judged: &[Judged<'_>]) -> Table {
     let mut table = Table::new(
         "Where",
-        "Links over all events: a missed one, or one without a link, is wrong. Alone: one link was told and no other, and it is right. One of two: the touched link was told, alone or as one of two. Force: angle to the true one, of found events.",
+        "Links over all events: a missed event, or one without a reported link, is wrong. Alone: exactly one link was reported, and it is right. One of two: the touched link was reported, alone or as one of two. Force: angle to the true force, over found events.",
         &[
             "detector",
             "link exact",
@@ -235,7 +235,7 @@ pub fn places(judged: &[Judged<'_>]) -> Table {
     table
 }
 
-/// What there is to tell without labels.
+/// Detections without scores, for recordings without labels.
 pub fn unscored(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Table {
     let mut tests = evaluation.request.recordings.iter();
     let note = if tests.any(|recording| recording.role == Role::Test) {
@@ -249,7 +249,7 @@ pub fn unscored(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Table {
         let runner = judged.run.first();
         let test = (runner.outputs.iter()).filter(|output| output.role == Role::Test);
         let events: Vec<_> = test.flat_map(|output| &output.events).collect();
-        // The sum of nothing would be -0.
+        // `sum` of no values is -0.
         let alarm = events
             .iter()
             .fold(0.0, |sum, event| sum + (event.t_off - event.t));
@@ -263,7 +263,7 @@ pub fn unscored(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Table {
     table
 }
 
-/// By link, the smallest force that `tauscope` finds, for its own wish and two others.
+/// Smallest force that `tauscope` finds, by link, for its own rate of false alarms and two others.
 pub fn smallest(judged: &[Judged<'_>]) -> Vec<Table> {
     let tables = judged.iter().filter_map(|one| {
         let settings = one.run.first().config.settings::<tauscope_detect::tauscope::Settings>()?;
@@ -274,7 +274,7 @@ pub fn smallest(judged: &[Judged<'_>]) -> Vec<Table> {
         wishes.extend(others.map(|(other, said)| (other, said.to_owned())));
         let mut table = Table::new(
             format!("Smallest force found, {}", one.label),
-            "Force that is found once it has lasted 0.2 s, in half and in nine of ten of the postures and directions of the contact-free recordings [N], by the tolerated rate of false alarms.",
+            "Smallest force that is found once it has lasted 0.2 s [N], by the tolerated rate of false alarms: in half, and in nine of ten, of the postures and directions of the contact-free recordings.",
             &["link"],
         );
         for (_, said) in &wishes {
@@ -296,7 +296,7 @@ pub fn smallest(judged: &[Judged<'_>]) -> Vec<Table> {
     tables.collect()
 }
 
-/// A force \[N\]; one that an arm would not withstand is none that is found.
+/// Formats a force \[N\]; one above what an arm withstands is shown as a lower bound.
 fn findable(force_n: Option<f64>) -> String {
     /// Tuned: by hand, for the words of the table; no number depends on it.
     const MOST_N: f64 = 2000.0;

@@ -1,16 +1,15 @@
-//! Raises an alarm while any joint's residual is beyond a threshold, and until it has stayed below
-//! for a while.
+//! Raises an alarm while any joint's residual exceeds a threshold, and until it has stayed below it for a hold time.
 
 use serde::Deserialize;
 use tauscope_bus::{Detection, Emit, Name, Seat, Stage, StageError, TwinState, flags};
 
-/// What the pipeline file may say: `outside: {command: [...], settings: {threshold: 8.0}}`.
+/// Settings in the pipeline file: `outside: {command: [...], settings: {threshold: 8.0}}`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
     /// Residual that raises the alarm, in the cell's effort unit.
     pub threshold: f64,
-    /// How long the residual must stay below it for the alarm to end \[s\].
+    /// Time for which the residual must stay below the threshold to end the alarm \[s\].
     pub hold_s: f64,
 }
 
@@ -24,10 +23,10 @@ impl Default for Config {
 }
 
 impl Config {
-    /// What the seat says; the usual values if it says nothing.
+    /// Settings of the seat; the defaults without any.
     ///
     /// # Errors
-    /// If it says something else.
+    /// If the settings are invalid.
     pub fn of(seat: &Seat) -> Result<Self, serde_json::Error> {
         if seat.config.is_null() {
             return Ok(Self::default());
@@ -39,12 +38,12 @@ impl Config {
 /// A threshold on the largest residual of all joints.
 pub struct PeakResidual {
     config: Config,
-    /// While an alarm lasts: when it began, and when the residual was last beyond the threshold.
+    /// During an alarm: its start, and the last time at which the residual exceeded the threshold.
     alarm: Option<(i64, i64)>,
 }
 
 impl PeakResidual {
-    /// Without an alarm.
+    /// Creates the stage without an alarm.
     pub fn new(config: Config) -> Self {
         Self {
             config,
@@ -52,7 +51,7 @@ impl PeakResidual {
         }
     }
 
-    /// The next sample's alarm, and the event it brings.
+    /// Returns the alarm state of the next sample, and its event.
     fn judge(&mut self, stamp_ns: i64, score: f64) -> (bool, u32) {
         let beyond = score > self.config.threshold;
         match self.alarm {
@@ -153,7 +152,7 @@ mod tests {
         let seen = run(flags::READY);
         let at = |event| seen.iter().position(|d| d.event == event);
         assert_eq!(at(Detection::ONSET), Some(100));
-        // The last sample beyond is 149, and 0.2 s are 20 samples.
+        // The last sample above the threshold is 149, and 0.2 s are 20 samples.
         assert_eq!(at(Detection::OFFSET), Some(169));
         assert_eq!(seen[120].joints, 0b100);
         assert_eq!(seen[120].contact_ns, 1_000_000_000);

@@ -1,4 +1,4 @@
-//! A stage from outside tauscope: one `Stage`, one line of `main`.
+//! A stage outside tauscope: one `Stage`, one line of `main`.
 
 use std::process::ExitCode;
 

@@ -1,18 +1,18 @@
-//! Columns of a regression: how the effort changes with one coordinate, at the rows that are compared.
+//! Columns of a regression: the derivative of the effort with respect to one coordinate, at the compared rows.
 
 use std::sync::Arc;
 
-/// A signal that is zero but for one joint, or not.
+/// A signal of one joint, zero at all others, or of all joints.
 #[derive(Debug, Clone)]
 pub struct Column {
-    /// The joint that `values` belong to; `None` if they are of all joints.
+    /// The joint of `values`; `None` if they cover all joints.
     pub joint: Option<usize>,
-    /// Rows of the joint, or of all joints one after the other.
+    /// Rows of the joint, or of all joints in succession.
     pub values: Vec<f64>,
 }
 
 impl Column {
-    /// The rows of a joint, `None` if they are zero.
+    /// Returns the rows of a joint, `None` if they are zero.
     pub fn of_joint(&self, joint: usize, rows: usize) -> Option<&[f64]> {
         match self.joint {
             Some(own) => (own == joint).then_some(&self.values[..]),
@@ -20,7 +20,7 @@ impl Column {
         }
     }
 
-    /// The column times a factor.
+    /// Returns the column multiplied by a factor.
     #[must_use]
     pub fn times(&self, factor: f64) -> Self {
         Self {
@@ -30,11 +30,11 @@ impl Column {
     }
 }
 
-/// The columns of a hypothesis at some shape.
+/// The columns of a hypothesis at given nonlinear parameters.
 #[derive(Debug)]
 pub struct Columns {
-    /// What its shape alone does, `None` if nothing.
+    /// Effort at the nonlinear parameters with all linear coefficients at zero; `None` if it is zero.
     pub alone: Option<Column>,
-    /// What each of its factors adds per unit.
+    /// Effort per unit of each linear coefficient.
     pub factors: Vec<Arc<Column>>,
 }

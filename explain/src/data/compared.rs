@@ -1,26 +1,27 @@
-//! Which samples of a recording tell the physics of a joint: those whose motion is known.
+//! Selection of the samples of a recording that a joint is fitted to: those whose motion is known.
 
 use crate::data::track::{STANDSTILL_RAD_S, Track};
 use crate::read::recording::{MAX_GAP_S, mean_step_s};
 
-/// Samples nearer than this to an end of the recording or to a gap are left out, in periods of the cutoff.
+/// Margin at the ends of the recording and at gaps within which samples are excluded, in periods of the cutoff.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const END_PERIODS: f64 = 0.8;
-/// Samples nearer than this to a standstill or reversal of the joint are left out, in periods of the cutoff. The
+/// Margin at standstills and reversals of the joint within which samples are excluded, in periods of the cutoff. The
 /// motion does not determine the friction there.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const REVERSAL_PERIODS: f64 = 0.4;
-/// A gap this long leaves the acceleration open that the comparison needs, in periods of the cutoff.
+/// Length of a gap that leaves the acceleration undetermined, in periods of the cutoff.
 /// Physical: a motion below the cutoff bends within a quarter of its period.
 const OPEN_PERIODS: f64 = 0.3;
-/// And it is this many times as long as the mean time between samples.
+/// Smallest length of such a gap, in mean sample intervals.
 /// Resolution: on an uneven clock two or three samples in a row are missing now and then.
 const OPEN_SAMPLES: f64 = 4.0;
 
 impl Track {
-    /// Beginning and end of each gap that leaves the motion below a cutoff open, with what is left out beside it \[s\].
+    /// Returns the start and end of each gap that leaves the motion below a cutoff undetermined, with its margins
+    /// \[s\].
     pub(crate) fn gaps(&self, cutoff_hz: f64) -> Vec<[f64; 2]> {
-        // Of poses no motion is needed.
+        // Poses need no motion.
         if mean_step_s(&self.time_s) > MAX_GAP_S {
             return Vec::new();
         }
@@ -38,8 +39,8 @@ impl Track {
         pairs.filter_map(beside).collect()
     }
 
-    /// Which samples of a joint are compared. Left out are the ends, the `gaps` and, if the joint `moves`, its standstills
-    /// and reversals.
+    /// Selects the samples of a joint that are compared: all but the ends, the `gaps` and, if the joint `moves`, its
+    /// standstills and reversals.
     pub(crate) fn counts(
         &self,
         joint: usize,
@@ -82,7 +83,7 @@ mod tests {
     use crate::fixture;
     use crate::read::recording::MAX_GAP_S;
 
-    /// Rows of a joint that count if no sample is recorded from 3 s on for so long.
+    /// Returns the number of compared rows of a joint if `gap_s` of the recording are missing from 3 s on.
     fn rows_that_count(gap_s: f64) -> usize {
         let model = fixture::model();
         let mut recording = fixture::recording(&model, 4, |_, _, _| {});

@@ -1,4 +1,4 @@
-//! Memo of a problem: columns and efforts that were computed before.
+//! Cache of a problem: computed columns and efforts.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -6,31 +6,31 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::data::column::Columns;
 use crate::data::efforts::TrackEfforts;
 
-/// Problems with more rows than this do without the memo.
+/// Largest number of rows of a problem that uses the cache.
 /// Resolution: larger problems compute the same numbers again, which takes time instead of memory.
 pub const MOST_ROWS: usize = 12_000;
-/// At most this many numbers are kept of each kind: 160 MB.
+/// Largest number of values kept of each kind: 160 MB.
 /// Resolution: memory against computing time.
 const KEPT_NUMBERS: usize = 20_000_000;
 
-/// An effect, its place (joint, source joint, link), and the bits of its shape parameters.
+/// An effect, its place (joint, source joint, link), and the bits of its nonlinear parameters.
 pub type Key = (&'static str, [usize; 3], Vec<u64>);
 
-/// Columns and efforts of effects, by effect, place and shape.
+/// Columns and efforts of effects, by effect, place and nonlinear parameters.
 #[derive(Debug, Default)]
 pub struct ColumnCache {
-    /// Filtered columns where effects only add to what is recorded.
+    /// Filtered columns of effects that only add to the recorded effort.
     pub columns: Kept<Columns>,
     /// Unfiltered efforts of effects on bodies.
     pub bodies: Kept<BodyEfforts>,
 }
 
-/// The effort of an effect on bodies at some shape, unfiltered and before torque scales.
+/// The effort of an effect on bodies at given nonlinear parameters, unfiltered and before torque scales.
 #[derive(Debug)]
 pub struct BodyEfforts {
-    /// What its shape alone does, `None` if nothing.
+    /// Effort with all linear coefficients at zero, `None` if it is zero.
     pub alone: Option<TrackEfforts>,
-    /// The effort of each of its factors per unit.
+    /// Effort per unit of each linear coefficient.
     pub factors: Vec<TrackEfforts>,
 }
 
@@ -52,7 +52,7 @@ pub struct UnitEfforts {
     pub signals: Shared<Vec<Vec<f64>>>,
 }
 
-/// A map that is filled as its entries are asked for.
+/// A map whose entries are computed on first use.
 #[derive(Debug)]
 pub struct Shared<T>(Mutex<HashMap<Unit, Arc<T>>>);
 
@@ -63,7 +63,7 @@ impl<T> Default for Shared<T> {
 }
 
 impl<T> Shared<T> {
-    /// What is kept of `unit`, or else what `compute` gives.
+    /// Returns the entry of `unit`; computes and stores it if there is none.
     pub fn get_or(&self, unit: Unit, compute: impl FnOnce() -> T) -> Arc<T> {
         let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = lock().get(&unit) {
@@ -74,14 +74,14 @@ impl<T> Shared<T> {
     }
 }
 
-/// Keeps the newest of what was computed, up to [`KEPT_NUMBERS`].
+/// A cache that evicts its oldest entries beyond [`KEPT_NUMBERS`].
 #[derive(Debug)]
 pub struct Kept<T>(Mutex<KeptInner<T>>);
 
 #[derive(Debug)]
 struct KeptInner<T> {
     all: HashMap<Key, Arc<T>>,
-    /// From the oldest on, with how many numbers each holds.
+    /// Keys from the oldest on, each with its number of values.
     order: VecDeque<(Key, usize)>,
     numbers: usize,
 }
@@ -97,7 +97,8 @@ impl<T> Default for Kept<T> {
 }
 
 impl<T> Kept<T> {
-    /// What is kept under `key`, or else what `compute` gives, with how many numbers it holds.
+    /// Returns the entry of `key`; computes and stores it if there is none. `compute` also returns its number of
+    /// values.
     pub fn get_or(&self, key: Key, compute: impl FnOnce() -> (T, usize)) -> Arc<T> {
         let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = lock().all.get(&key) {

@@ -8,7 +8,7 @@ pub const MEDIAN_OF_ABS_NORMAL: f64 = 0.6745;
 /// Variance of the fourth difference of white noise with variance 1.
 /// Statistical: the sum of the squared coefficients, 1 + 16 + 36 + 16 + 1.
 const FOURTH_DIFFERENCE_VARIANCE: f64 = 70.0;
-/// Variance of the white noise on a smooth signal, from its fourth differences, robust against jumps.
+/// Estimates the variance of the white noise on a smooth signal from its fourth differences, robust against jumps.
 pub fn white_variance(signal: &[f64]) -> f64 {
     let mut squares: Vec<f64> = signal
         .windows(5)
@@ -22,11 +22,11 @@ pub fn white_variance(signal: &[f64]) -> f64 {
     deviation * deviation / FOURTH_DIFFERENCE_VARIANCE
 }
 
-/// Variance of the white noise on an effort, and the share of its samples that are new.
+/// Estimates the variance of the white noise on an effort, and the share of its samples that are new.
 ///
-/// A driver may repeat an effort until it has another one, or tell it in coarse steps. Then most differences are zero and
-/// say nothing of the noise: only samples that differ from the one before are compared, and a step hides what is
-/// smaller than it.
+/// A driver may repeat an effort until it has a new one, or quantise it coarsely. Then most differences are zero and
+/// carry no information on the noise. So repeated samples are left out, and the variance of the quantisation error is
+/// a lower bound.
 pub fn of_effort(signal: &[f64]) -> (f64, f64) {
     let mut new = signal.to_vec();
     new.dedup();
@@ -44,8 +44,8 @@ pub fn of_effort(signal: &[f64]) -> (f64, f64) {
     (white_variance(&new).max(of_step), share)
 }
 
-/// White noise of the measured effort of a joint \[effort unit\]. Not a number for recordings of poses, whose differences are
-/// gravity's.
+/// Estimates the standard deviation of the white noise on a joint's measured effort \[effort unit\]. NaN for
+/// recordings of poses, whose differences are caused by gravity.
 pub fn white_noise(recordings: &[Recording], joint: usize, n: usize) -> f64 {
     let mut all: Vec<f64> = recordings
         .iter()
@@ -70,7 +70,7 @@ mod tests {
     use super::*;
     use crate::fixture::Noise;
 
-    /// A slow motion's effort with noise of 0.1, each value told `times` times.
+    /// Effort of a slow motion with noise of 0.1, each value repeated `times` times.
     fn told(times: usize) -> Vec<f64> {
         let mut noise = Noise(5);
         let of = |k: usize| (0.02 * k as f64).sin() + 0.1 * noise.next();

@@ -1,9 +1,9 @@
-//! Another simulation as the twin: what its topic has that is no physics of the arm.
+//! Preparation of the effort of an external twin: another simulation, whose effort comes from a topic.
 //!
-//! It computes the effort of the *commanded* motion. So its effort is late or early against the measured one, has spikes
-//! where its solver or its transport stumbles, and its friction turns when the command turns, while the real joint still
-//! holds or creeps. Spikes are taken out, the effort is put on the clock of the recording, and rows where the two are in
-//! different states of friction are left out.
+//! It computes the effort of the *commanded* motion. So its effort leads or lags the measured one, has spikes where
+//! its solver or its transport stalls, and its friction reverses with the command while the real joint still sticks
+//! or creeps. Spikes are removed, the effort is aligned with the clock of the recording, and rows in which the two
+//! are in different states of friction are excluded.
 
 mod regression;
 mod states;
@@ -18,31 +18,31 @@ use regression::{
 };
 pub use states::leave_out_other_states;
 
-/// Samples to either side of one whose median tells a spike.
+/// Half width of the running median that detects spikes \[samples\].
 /// Resolution: a spike of up to two samples is seen, and a step in the effort stays as it is.
 const SPIKE_REACH: usize = 2;
-/// A spike is this many median deviations from its neighbours' median.
+/// Smallest deviation of a spike from the running median, in median absolute deviations.
 /// Statistical: a normal variable is ten standard deviations from its mean in none of 1e22 samples.
 const SPIKE_DEVIATIONS: f64 = 15.0;
-/// And at least this share of the range of the joint's effort.
+/// Smallest deviation of a spike, relative to the range of the joint's effort.
 /// Resolution: what is smaller than that changes no finding.
 const SPIKE_SHARE: f64 = 0.01;
-/// Latest effort of the other simulation that is looked for \[s\].
+/// Largest delay of the external twin's effort in the search \[s\].
 /// Physical: a few cycles of a bus at 50 Hz.
 const LATEST_S: f64 = 0.06;
-/// Steps of the search; between them a parabola is laid through the best three.
+/// Step of the search, refined by a parabola through the best three steps \[s\].
 /// Resolution: a quarter of a sample at 100 Hz.
 const STEP_S: f64 = 0.0025;
-/// Evidence that a lateness needs \[nats\].
+/// Evidence required to accept a delay \[nats\].
 /// Statistical: odds of 20 000 to 1.
 const LATE_EVIDENCE: f64 = 10.0;
 /// Number of [`TAPS_S`].
 const TAPS: usize = 4;
-/// Times at which the other simulation's effort is weighed, to follow a joint that follows its command \[s\].
+/// Time shifts of the external twin's effort in the model of a joint that lags or leads its command \[s\].
 /// Resolution: twice the comparison's fastest response, 1 / (2 pi 8 Hz) = 0.02 s, in steps of that.
 const TAPS_S: [f64; TAPS] = [-0.04, -0.02, 0.02, 0.04];
 
-/// Takes the spikes out of the other simulation's effort.
+/// Replaces spikes in the external twin's effort by the running median.
 fn take_out_spikes(recording: &mut Recording, joints: usize) {
     for joint in 0..joints {
         let own: Vec<f64> = (recording.reference.iter())
@@ -74,8 +74,8 @@ fn take_out_spikes(recording: &mut Recording, joints: usize) {
     }
 }
 
-/// By how much the other simulation's effort is late in the recordings of `problem` \[s\]; 0 if it is early or on time. A
-/// recorded effort that is late is an effect of its own, `torque_delay`.
+/// Estimates the delay of the external twin's effort in the recordings of `problem` \[s\]; 0 if it is early or on
+/// time. A delay of the recorded effort is an effect of its own, `torque_delay`.
 fn lateness_s(problem: &Problem) -> f64 {
     let columns: Vec<Vec<f64>> = plain_columns(problem);
     let on_time: Vec<f64> = (problem.measured.iter())
@@ -134,8 +134,8 @@ fn lateness_s(problem: &Problem) -> f64 {
     STEP_S * (best as f64 + shift.clamp(-0.5, 0.5))
 }
 
-/// Takes the spikes out of the other simulation's effort and puts it on the recordings' clock. Returns by how much it was
-/// late \[s\]. `constants` convert the recordings' unit into the model's, and `unit_nm` into N m, by joint.
+/// Removes the spikes of the external twin's effort and aligns it with the clock of the recordings. Returns its delay
+/// \[s\]. `constants` convert the recordings' unit into the model's, and `unit_nm` into N m, by joint.
 pub fn put_on_clock(input: &mut Input, constants: &[f64], unit_nm: &[f64]) -> f64 {
     let n = input.model.dof();
     for recording in input.fit.iter_mut().chain(&mut input.holdout) {
@@ -154,7 +154,7 @@ pub fn put_on_clock(input: &mut Input, constants: &[f64], unit_nm: &[f64]) -> f6
     late_s
 }
 
-/// The data of a fit of the recordings in motion.
+/// Prepares the recordings for a fit without standstills.
 fn prepared(input: &Input, constants: &[f64], unit_nm: &[f64]) -> Problem {
     let cutoff_hz = Problem::cutoff_hz(&input.fit);
     let motion_hz = Problem::motion_cutoff_hz(cutoff_hz);
@@ -171,7 +171,7 @@ fn prepared(input: &Input, constants: &[f64], unit_nm: &[f64]) -> Problem {
     )
 }
 
-/// `effort` (row-major) as the joints follow it: for each joint its weighted mean over [`TAPS_S`], by `taps`.
+/// Returns `effort` (row-major) as the joints follow it: for each joint its weighted mean over [`TAPS_S`], by `taps`.
 fn filtered(time_s: &[f64], effort: &[f64], taps: &[[f64; TAPS]]) -> Vec<f64> {
     let n = taps.len();
     let mut out = effort.to_vec();
@@ -184,8 +184,9 @@ fn filtered(time_s: &[f64], effort: &[f64], taps: &[[f64; TAPS]]) -> Vec<f64> {
     out
 }
 
-/// How a joint follows its command: the weights of the other simulation's effort at [`TAPS_S`], the rest being that at the
-/// instant itself. No weight is negative, and all are zero where that is no worse.
+/// Estimates the response of a joint to its command as weights of the external twin's effort at [`TAPS_S`]; the
+/// remaining weight applies to the instant itself. The weights are not negative, and all are zero unless they
+/// increase the evidence by [`LATE_EVIDENCE`].
 fn followed(problem: &Problem, joint: usize) -> [f64; TAPS] {
     let at = |shift_s: f64| {
         let shifted = |t: &FitTrack| {
@@ -231,7 +232,7 @@ fn followed(problem: &Problem, joint: usize) -> [f64; TAPS] {
     taps
 }
 
-/// `effort` (row-major) as it was `late_s` after each sample; the last one after the end.
+/// Returns `effort` (row-major) interpolated at `late_s` after each sample; beyond the end, the last sample.
 fn earlier(time_s: &[f64], effort: &[f64], joints: usize, late_s: f64) -> Vec<f64> {
     let mut out = Vec::with_capacity(effort.len());
     let last = time_s.len().saturating_sub(1);
@@ -260,7 +261,7 @@ mod tests {
     use super::*;
     use crate::fixture::{Noise, model, problem, recording};
 
-    /// Recordings whose twin is another simulation: late, with friction of its own and a spike.
+    /// Recordings whose twin is another simulation: `late` samples late, with friction of its own.
     fn recordings(late: usize) -> Vec<Recording> {
         let model = model();
         let mut noise = Noise(3);
@@ -304,14 +305,14 @@ mod tests {
         assert!(most < 1.0, "{most} N m");
     }
 
-    /// Friction that is large beside how fast gravity's effort changes \[N m\].
+    /// Friction that is large compared with the change of gravity's effort \[N m\].
     const FRICTION_NM: f64 = 15.0;
 
     #[test]
     fn rows_where_only_the_command_has_turned_are_left_out() {
         let mut all = recordings(0);
         for recording in &mut all {
-            // The real friction turns a tenth of a second after that of the command.
+            // The real friction reverses a tenth of a second after that of the command.
             for k in 10..recording.len() {
                 let then = recording.velocity[2 * (k - 10)].signum();
                 recording.effort[2 * k] += FRICTION_NM * then;

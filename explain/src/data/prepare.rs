@@ -1,4 +1,4 @@
-//! From recordings to the data of a fit.
+//! Preparation of recordings as the data of a fit.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -12,37 +12,37 @@ use crate::data::track::{FitTrack, Track, moving_joints, spaced, thinned};
 use crate::read::audit::is_unmeasured;
 use crate::read::recording::Recording;
 
-/// Efforts are compared below this frequency, or below [`CUTOFF_OF_RATE`] where recordings are slow \[Hz\].
+/// Cutoff of the comparison of efforts; [`CUTOFF_OF_RATE`] applies where recordings are slow \[Hz\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const CUTOFF_HZ: f64 = 8.0;
-/// The cutoff is at most this share of the sample rate.
+/// Upper bound of the cutoff, relative to the sample rate.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const CUTOFF_OF_RATE: f64 = 0.1;
 /// Cutoff over sample rate for recordings of poses, which no filter may mix. Derived: at half the rate, the Nyquist
 /// frequency, the filter's response `1 / (1 + (f / fc)^6)` is then above 0.999.
 const POSES_OF_RATE: f64 = 2.0;
-/// The cutoff of the motion's smoother over that of the comparison.
+/// Cutoff of the motion's smoother, relative to that of the comparison.
 /// Physical: a smoother with the response `1 / (1 + (f / fc)^6)` still passes 98 % at half its cutoff.
 const MOTION_CUTOFF_RATIO: f64 = 2.0;
-/// Recordings are thinned for the fit to a rate between these two \[Hz\].
+/// Range of the sample rate that recordings are thinned to for the fit \[Hz\].
 /// Resolution: changes the computing time; twice the highest cutoff at the least.
 const FIT_RATE_HZ: [f64; 2] = [50.0, 130.0];
-/// Sessions with more samples per joint than this are thinned below the higher rate.
+/// Number of samples per joint above which a session is thinned below the upper rate.
 /// Resolution: changes the computing time.
 const FIT_SAMPLES: f64 = 8000.0;
-/// The cutoff of the filter against aliasing, before thinning, over that of the comparison.
+/// Cutoff of the anti-aliasing filter before thinning, relative to that of the comparison.
 /// Resolution: the filter passes all that the comparison does, and stops what thinning would fold.
 const ALIASING_RATIO: f64 = 5.0;
 /// Noise bandwidth of the comparison's filter over its cutoff.
 /// Statistical: the integral of the squared response `1 / (1 + x^6)` from zero on, 5/6 of π/6 over its sine.
 const NOISE_BANDWIDTH: f64 = 0.873;
 
-/// No driver tells an effort better than this share of its largest.
+/// Finest relative resolution of an effort, as a share of the largest one.
 /// Resolution: that of a number in single precision.
 const RESOLUTION: f64 = 1e-7;
 
 impl Problem {
-    /// The frequency below which these recordings are compared \[Hz\].
+    /// Returns the frequency below which these recordings are compared \[Hz\].
     pub fn cutoff_hz(recordings: &[Recording]) -> f64 {
         let of = |recording: &Recording| {
             let share = if recording.is_of_poses() {
@@ -55,7 +55,7 @@ impl Problem {
         recordings.iter().map(of).fold(CUTOFF_HZ, f64::min)
     }
 
-    /// The half amplitude of the smoother of motion for a comparison below `cutoff_hz` \[Hz\].
+    /// Returns the half-amplitude frequency of the motion's smoother for a comparison below `cutoff_hz` \[Hz\].
     pub fn motion_cutoff_hz(cutoff_hz: f64) -> f64 {
         MOTION_CUTOFF_RATIO * cutoff_hz
     }
@@ -99,7 +99,8 @@ impl Problem {
                 let mut signal: Vec<f64> = of_joint
                     .map(|at| (recording.effort[at] - full.beside[at]) * unit_nm[j])
                     .collect();
-                // Fourth differences from pose to pose are gravity's, not noise. The inference estimates the noise of poses.
+                // Fourth differences between poses are caused by gravity, not noise. The inference estimates the
+                // noise of poses.
                 let (white, new) = if recording.is_of_poses() {
                     (0.0, 1.0)
                 } else {
@@ -109,7 +110,7 @@ impl Problem {
                 let share = (cutoff_hz * NOISE_BANDWIDTH / (0.5 * rate)).min(1.0);
                 variances[j].push(white * share);
                 if kept.len() < full.len() {
-                    // Against aliasing.
+                    // Prevents aliasing.
                     LowPass::new(&full.time_s, ALIASING_RATIO * cutoff_hz).apply(&mut signal);
                 }
                 let mut signal: Vec<f64> = kept.iter().map(|&k| signal[k]).collect();
@@ -141,7 +142,7 @@ impl Problem {
         problem
     }
 
-    /// No recordings of a robot.
+    /// Creates a problem without recordings.
     fn empty(model: &Model, cutoff_hz: f64) -> Self {
         let n = model.dof();
         Self {
@@ -169,14 +170,14 @@ impl Problem {
     }
 }
 
-/// No row of a joint counts in a recording that does not measure its effort.
+/// Excludes all rows of a joint in a recording that does not measure its effort.
 fn leave_out_unmeasured(counts: &mut [bool], recording: &Recording, joint: usize, n: usize) {
     if is_unmeasured(recording, joint, n) {
         counts.fill(false);
     }
 }
 
-/// The positions of a joint in all recordings.
+/// Returns the positions of a joint in all recordings.
 fn positions(tracks: &[FitTrack], joint: usize, n: usize) -> Vec<f64> {
     let all = tracks
         .iter()
@@ -184,7 +185,8 @@ fn positions(tracks: &[FitTrack], joint: usize, n: usize) -> Vec<f64> {
     all.map(|row| row[joint]).collect()
 }
 
-/// Distance of neighbouring positions in the middle of a joint's range: half of the range is covered more finely.
+/// Returns the median gap between neighbouring positions, weighted by length: half of the joint's range has smaller
+/// gaps.
 fn middle_gap(mut positions: Vec<f64>) -> f64 {
     positions.sort_by(f64::total_cmp);
     let mut gaps: Vec<f64> = positions.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -198,7 +200,7 @@ fn middle_gap(mut positions: Vec<f64>) -> f64 {
     gaps.iter().find(reaches).copied().unwrap_or(0.0)
 }
 
-/// Standard deviation of a noise, no less than what the numbers of a driver resolve.
+/// Returns the standard deviation of a noise, bounded below by the resolution of the effort.
 fn deviation(variance: f64, largest_effort: f64) -> f64 {
     variance.sqrt().max(RESOLUTION * largest_effort)
 }
@@ -218,7 +220,8 @@ mod tests {
         assert!((gap - 0.2).abs() < 0.01, "{gap}");
     }
 
-    /// A log of one row a pose, whose time counts the rows: the effort of a pose is compared with the gravity at that pose.
+    /// A log with one row per pose, whose time counts the rows: the effort of a pose is compared with the gravity
+    /// there.
     #[test]
     fn poses_are_compared_as_they_are() {
         let model = model();

@@ -11,8 +11,8 @@ use crate::data::efforts::{Efforts, TrackEfforts};
 use crate::data::memo::{ColumnCache, UnitEfforts};
 use crate::data::track::FitTrack;
 
-/// Everything that a fit works on. A *signal* is joint-major: `rows` numbers for joint 0, then for joint 1,
-/// and so on; the rows of each joint are those of the tracks, one after the other.
+/// The data of a fit. A *signal* is joint-major: `rows` numbers for joint 0, then for joint 1, and so on. The rows of
+/// each joint are those of the tracks in succession.
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// The robot.
@@ -25,30 +25,30 @@ pub struct Problem {
     pub rows: usize,
     /// Measured effort, filtered \[N m or N\].
     pub measured: Vec<f64>,
-    /// 1 where a joint's row counts, 0 where it stands still or the filters have no footing.
+    /// 1 where a joint's row is compared, 0 at its standstills and where the filters lack data.
     pub weight: Vec<f64>,
-    /// Standard deviation of the measured effort's white noise after the filter, by joint \[N m\]: the least
-    /// that any model can leave.
+    /// Standard deviation of the measured effort's white noise after the filter, by joint \[N m\]: the lower bound of
+    /// the residual of any model.
     pub white_noise: Vec<f64>,
     /// Largest measured effort by joint, unfiltered \[N m\].
     pub largest_effort: Vec<f64>,
-    /// Distance of neighbouring positions in the middle of the range, by joint \[rad or m\].
+    /// Length-weighted median gap between neighbouring positions, by joint \[rad or m\].
     pub position_gaps: Vec<f64>,
-    /// Half amplitude of the filter \[Hz\].
+    /// Half-amplitude frequency of the filter \[Hz\].
     pub cutoff_hz: f64,
-    /// Coulomb and viscous friction by joint that the twin has already: by so much they may be less.
+    /// Coulomb and viscous friction that the twin already contains, by joint: the fit may reduce it by up to this.
     pub known_friction: Vec<BTreeMap<&'static str, f64>>,
-    /// Whether that friction is what the robot's file states, not what was found on this arm before.
+    /// Whether the robot's file states that friction; else it was found on this arm before.
     pub states_friction: bool,
-    /// Whether the twin's effort is another simulation's, which follows the command and not the motion.
+    /// Whether the twin is external: a simulation that follows the command and not the measured motion.
     pub is_foreign: bool,
-    /// By joint, the gain that the fit of an unknown torque scale starts from \[effort unit per model unit\].
+    /// Initial gain of the fit of an unknown torque scale, by joint \[effort unit per model unit\].
     pub first_gains: Vec<f64>,
-    /// Columns that were computed before.
+    /// Cache of computed columns.
     pub cache: Arc<ColumnCache>,
-    /// What unit bodies cost.
+    /// Efforts of unit bodies, computed on first use.
     pub units: Arc<UnitEfforts>,
-    /// What the robot costs along the recorded motion, once that was asked for: by joint and sample of all tracks.
+    /// Effort of the rigid robot along the recorded motion, by joint and sample of all tracks; computed on first use.
     pub recorded: OnceLock<Arc<Vec<f64>>>,
     pub(super) bare: OnceLock<Efforts>,
     pub(super) rigid: OnceLock<Vec<f64>>,
@@ -56,7 +56,7 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// When the first recording begins and the last one ends \[s from the start of the session\].
+    /// Returns the start of the first recording and the end of the last one \[s from the start of the session\].
     pub fn session_s(&self) -> (f64, f64) {
         let first_s = |t: &FitTrack| t.track.session_s;
         let last_s = |t: &FitTrack| first_s(t) + t.track.time_s.last().copied().unwrap_or(0.0);
@@ -68,13 +68,14 @@ impl Problem {
         (first, self.tracks.iter().map(last_s).fold(first, f64::max))
     }
 
-    /// Waves over a turn of a joint that its positions resolve: two a wave (Shannon, "Communication in the Presence of Noise", 1949,
-    /// theorem 1). Between poses far apart, faster waves are any function.
+    /// Returns the highest number of waves per turn that a joint's positions resolve: two positions per wave
+    /// (Shannon, "Communication in the Presence of Noise", 1949, theorem 1). Poses far apart do not determine faster
+    /// waves.
     pub fn most_waves(&self, joint: usize) -> f64 {
         std::f64::consts::PI / self.position_gaps[joint]
     }
 
-    /// What the twin says without any physics beside it.
+    /// Returns the efforts of the twin without any effect.
     pub fn bare(&self) -> &Efforts {
         self.bare.get_or_init(|| {
             let rigid = self.tracks.iter().map(|t| t.track.rigid.clone()).collect();
@@ -82,12 +83,13 @@ impl Problem {
         })
     }
 
-    /// The same as a signal.
+    /// Returns the efforts of the twin without any effect, as a signal.
     pub fn rigid(&self) -> &[f64] {
         self.rigid.get_or_init(|| self.signal(&self.bare().body))
     }
 
-    /// What bodies cost as a joint's link leaves the motion, over all tracks.
+    /// Returns the expansion of the rigid-body effort for deviations of a joint's link from the motion, over all
+    /// tracks.
     pub fn expansion(&self, joint: usize) -> &Arc<Expansion> {
         self.expansions[joint].get_or_init(|| {
             let (model, mut data) = (&self.model, Data::new(&self.model));
@@ -101,12 +103,12 @@ impl Problem {
         })
     }
 
-    /// The part of a signal that is joint `joint`'s.
+    /// Returns the range of a joint in a signal.
     pub fn joint_rows(&self, joint: usize) -> std::ops::Range<usize> {
         joint * self.rows..(joint + 1) * self.rows
     }
 
-    /// The rows of a joint that count, as recording, row of the joint, and sample of the recording's track.
+    /// Returns the compared rows of a joint as recording, row of the joint, and sample of the recording's track.
     pub fn counted(&self, joint: usize) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
         let weight = &self.weight[self.joint_rows(joint)];
         let of = |(recording, track): (usize, &'_ FitTrack)| {
@@ -126,7 +128,7 @@ impl Problem {
         signal
     }
 
-    /// The same for one joint.
+    /// Filters the efforts of one joint over all tracks into its rows of a signal.
     pub fn joint_signal(&self, efforts: &[Vec<f64>], joint: usize, into: &mut [f64]) {
         for (track, effort) in self.tracks.iter().zip(efforts) {
             let one = effort
@@ -139,11 +141,11 @@ impl Problem {
         }
     }
 
-    /// One joint's effort over all tracks, one number a sample, as a column.
+    /// Filters one joint's effort over all tracks, one number per sample, into a column.
     pub fn column_at(&self, joint: usize, effort: TrackEfforts) -> Column {
         let mut values = vec![0.0; self.rows];
         for (track, effort) in self.tracks.iter().zip(effort) {
-            // Silence stays silence behind a filter.
+            // The filter of a zero signal is zero.
             if effort.iter().any(|x| *x != 0.0) {
                 track.compare(joint, effort, &mut values[track.rows()]);
             }
@@ -152,7 +154,7 @@ impl Problem {
         Column { joint, values }
     }
 
-    /// An effort over all tracks as a column: of one joint, or of all.
+    /// Filters an effort over all tracks into a column of one joint or of all.
     pub fn column(&self, effort: &[Vec<f64>], joint: Option<usize>) -> Column {
         let values = match joint {
             Some(joint) => {

@@ -1,18 +1,21 @@
-//! How long a recording of an arm at rest begins quietly: a push that begins in its first second is no usual load.
+//! Duration of the undisturbed start of a recording of an arm at rest: a push in its first second is not part of the
+//! baseline load.
 
 use crate::data::noise::MEDIAN_OF_ABS_NORMAL;
 
 /// Length of the windows whose means are compared \[s\].
-/// Resolution: a push that begins within the first of them is taken for the load.
+/// Resolution: a push that begins within the first window is treated as load.
 const WINDOW_S: f64 = 0.25;
-/// The load has left the beginning if it is this many times further off than it changes from one window to the next.
+/// Smallest deviation of a window's mean from that of the first window that ends the undisturbed start, in standard
+/// deviations of the change between windows.
 /// Statistical: a normal variable does so in none of 1e22 windows; slow noise of a second in none of 1e6.
 const LEFT: f64 = 10.0;
-/// Fewer windows tell nothing of the noise.
+/// Smallest number of windows for an estimate of the noise.
 /// Statistical: the median of fewer changes may be that of a push.
 const LEAST_WINDOWS: usize = 12;
 
-/// Until when the beginning of a recording, `most_s` long at most, is quiet \[s\]. `off` is what the twin leaves by joint.
+/// Returns the duration of the undisturbed start of a recording, at most `most_s` \[s\]. `off` is the difference
+/// between measured effort and twin by joint.
 pub fn quiet_s(time_s: &[f64], off: &[Vec<f64>], most_s: f64) -> f64 {
     let each = off.iter().map(|off| of_joint(time_s, off, most_s));
     each.fold(most_s, f64::min)
@@ -47,7 +50,8 @@ mod tests {
     use super::*;
     use crate::fixture::Noise;
 
-    /// Ten seconds of slow noise with a push of 5 N m from `begins_s` on, for a second.
+    /// Returns the undisturbed start of ten seconds of slow noise with a push of 5 N m that lasts from `begins_s` for
+    /// a second.
     fn quiet(begins_s: f64) -> f64 {
         let mut noise = Noise(8);
         let mut slow = 0.0;

@@ -1,4 +1,5 @@
-//! What would make recordings match that do not match the robot: each remedy of a short list is tried on the data.
+//! Search for the correction of recordings that do not match the robot: each remedy of a short list is tried on the
+//! data.
 
 mod dropouts;
 mod mend;
@@ -19,64 +20,65 @@ use trial::{Left, Trial};
 pub use unmeasured::of_unmeasured;
 pub use velocity::of_velocity;
 
-/// A remedy must divide the error that friction and a gain leave by this, all joints together.
+/// Smallest factor by which a remedy must reduce the error left by friction and a gain, over all joints.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_GAIN: f64 = 3.0;
-/// No joint's error may grow by more than this factor.
+/// Largest factor by which a remedy may increase the error of any joint.
 /// Tuned: as [`LEAST_GAIN`].
 const HARMLESS: f64 = 1.1;
-/// A joint whose error the remedy divides by at least this counts as mended.
+/// Smallest error reduction of a joint that a remedy corrects, as a factor.
 /// Tuned: as [`LEAST_GAIN`].
 const MENDED: f64 = 1.3;
-/// Remedies are tried if the motion leaves this share of a joint's variance beside friction.
+/// Share of a joint's variance after friction that must be left unexplained by the motion before remedies are tried.
 /// Tuned: as [`LEAST_GAIN`]. Most arms leave less at all strong joints and are not searched.
 const SUSPECT: f64 = 0.1;
 
-/// What makes recordings match the robot.
+/// A correction of the recordings or of their description.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Remedy {
-    /// The base is turned: roll and pitch \[rad\], as in `base_tilt`. Physics, which the search names.
+    /// The base is mounted with this roll and pitch \[rad\], as in `base_tilt`. Physics, which the search reports.
     BaseTurned([f64; 2]),
-    /// The tool carries so much \[kg\]. Physics, too.
+    /// The tool carries a payload of this mass \[kg\]. Physics, too.
     Payload(f64),
     /// The efforts of two joints are swapped.
     Swapped(usize, usize),
-    /// Two joints have each other's name: position, velocity and effort are swapped.
+    /// The names of two joints are swapped: position, velocity and effort are swapped.
     NamesSwapped(usize, usize),
     /// The effort of a joint has the other sign.
     EffortTurned(usize),
-    /// The effort of a joint is told without its sign: it is left out.
+    /// The effort of a joint is a magnitude without sign: it is left out.
     EffortWithoutSign(usize),
     /// The position of a joint has the other sign.
     PositionTurned(usize),
-    /// The position of a joint counts the other way, and its effort with it.
+    /// The position and the effort of a joint have the other sign.
     JointTurned(usize),
-    /// The positions of joints that turn are in degrees.
+    /// The positions of rotary joints are in degrees.
     Degrees,
     /// The controller has subtracted gravity from the effort.
     GravitySubtracted,
-    /// The effort that is said to be in N m is motor current.
+    /// The effort declared as N m is motor current.
     IsCurrent,
-    /// The effort that is said to be in N m is a share of something that differs from joint to joint, such as the rated torque.
+    /// The effort declared as N m is relative to a quantity that differs from joint to joint, such as the rated
+    /// torque.
     IsOfRating,
-    /// The effort that is said to be motor current is in N m.
+    /// The effort declared as motor current is in N m.
     IsTorque,
-    /// The effort is so many times a N m at every joint.
+    /// The effort of all joints is this multiple of its value in N m.
     EffortScaled(f64),
-    /// The torque constants are to be multiplied by this.
+    /// The torque constants must be multiplied by this factor.
     ConstantsScaled(f64),
-    /// The torque constants are wrong, and by no common factor.
+    /// The torque constants are wrong, without a common factor.
     ConstantsWrong,
-    /// The effort of a joint is one number throughout: it is left out.
+    /// The effort of a joint is constant, with this value: it is left out.
     Unmeasured(usize, f64),
-    /// The effort of a joint drops to exactly zero in this many messages: their rows are left out.
+    /// The effort of a joint drops to exactly zero in this number of messages: their rows are left out.
     DropsOut(usize, u64),
-    /// The recorded velocity is so many times the change of position: of a joint, or of all.
+    /// The recorded velocity is this multiple of the change of position: of a joint, or of all.
     Velocity(Option<usize>, f64),
 }
 
 impl Remedy {
-    /// The `kind` of its finding; of physics, which becomes a finding of the search, none.
+    /// Returns the `kind` of its finding; `None` for physics, which the search reports.
     pub fn kind(&self) -> Option<&'static str> {
         Some(match self {
             Self::Swapped(..) => "efforts_swapped",
@@ -98,17 +100,17 @@ impl Remedy {
         })
     }
 
-    /// Whether the user left it out of the library.
+    /// Whether the user excluded it from the library.
     pub fn is_without(&self, without: &BTreeSet<String>) -> bool {
         self.kind().is_some_and(|kind| without.contains(kind))
     }
 
-    /// Whether it says that each joint's effort has a scale of its own.
+    /// Whether each joint's effort has a scale of its own.
     pub fn is_of_each_joint(&self) -> bool {
         matches!(self, Self::IsCurrent | Self::IsOfRating)
     }
 
-    /// By how much it must divide the error. An effort that is never below zero says so itself.
+    /// Returns the factor by which it must reduce the error. An effort that is never negative is evidence in itself.
     fn least_gain(&self) -> f64 {
         match self {
             Self::EffortWithoutSign(_) => MENDED,
@@ -117,21 +119,21 @@ impl Remedy {
     }
 }
 
-/// A remedy that was tried and helps.
+/// A remedy that reduces the error: a fault of the recordings.
 #[derive(Debug, Clone)]
 pub struct Slip {
-    /// What helps.
+    /// The correction.
     pub remedy: Remedy,
-    /// By joint that it mends, the error without and with it, beside friction and a gain \[N m, or A where the scale is not
-    /// known\].
+    /// Errors without and with it, after friction and a gain, by corrected joint
+    /// \[N m, or A where the scale is unknown\].
     pub mended: Vec<(usize, [f64; 2])>,
-    /// Share of the squared error, in units of what is left, that it takes away.
+    /// Share of the squared error that it explains, in units of the remaining error.
     pub share: f64,
-    /// By joint that tells, measured effort per effort that the motion requires, or recorded velocity per change of position.
+    /// Measured over required effort, or recorded velocity over change of position, by informative joint.
     pub slopes: Vec<(usize, f64)>,
 }
 
-/// How the recorded columns are read.
+/// An assignment of the recorded columns to joints, with signs and units.
 #[derive(Debug, Clone, PartialEq)]
 struct Reading {
     /// By joint, the joint whose effort column holds its effort.
@@ -142,7 +144,7 @@ struct Reading {
     effort: Vec<f64>,
     /// By joint, the factor of its position.
     position: Vec<f64>,
-    /// Whether gravity is part of the effort.
+    /// Whether the effort includes gravity.
     weighs: bool,
     /// By joint, whether its effort has no sign.
     without_sign: Vec<bool>,
@@ -160,7 +162,7 @@ impl Reading {
         }
     }
 
-    /// The same after a remedy that is no physics.
+    /// Returns the reading after a remedy that is not physics.
     fn with(&self, remedy: &Remedy, turns: &[bool]) -> Self {
         let mut new = self.clone();
         match *remedy {
@@ -190,17 +192,17 @@ impl Reading {
     }
 }
 
-/// What the audit found.
+/// The result of an audit.
 #[derive(Debug, Default)]
 pub struct Audit {
-    /// What is wrong with the recordings, the worst first.
+    /// Faults of the recordings, the largest first.
     pub slips: Vec<Slip>,
-    /// Physics that explains what does not match.
+    /// Physics that explains the mismatch.
     pub physics: Option<Remedy>,
 }
 
-/// Tries remedies, one after the other, until none helps. `is_scaled` says whether efforts are N m, so that gains are near 1.
-/// Kinds in `without` are not tried.
+/// Applies the best remedy, one after the other, until none helps. `is_scaled` states whether efforts are in N m, so
+/// that gains are near 1. Kinds in `without` are not tried.
 pub fn audit(problem: &Problem, is_scaled: bool, without: &BTreeSet<String>) -> Audit {
     let trial = Trial::new(problem, is_scaled);
     let n = problem.joints;
@@ -209,7 +211,8 @@ pub fn audit(problem: &Problem, is_scaled: bool, without: &BTreeSet<String>) -> 
         .collect();
     let mut reading = Reading::as_recorded(n);
     let mut model = problem.rigid().to_vec();
-    // What a corrected twin has beside its URDF. It stays, so that a position turned twice is the position as it was.
+    // The effort of a corrected twin in addition to its URDF. It stays unchanged, so that turning a position twice
+    // restores the original model.
     let urdf = trial.model(&reading);
     let mut beside: Vec<f64> = model
         .iter()
@@ -217,7 +220,7 @@ pub fn audit(problem: &Problem, is_scaled: bool, without: &BTreeSet<String>) -> 
         .map(|(twin, urdf)| twin - urdf)
         .collect();
     let mut found = Audit::default();
-    // Each joint may be turned and be in another's place; more is another robot.
+    // Each joint may be turned and swapped with another; more faults indicate another robot.
     while found.slips.len() < 2 * n {
         let now = trial.left(&model, &reading);
         if !now.iter().flatten().any(Left::is_suspect) {
@@ -242,7 +245,7 @@ pub fn audit(problem: &Problem, is_scaled: bool, without: &BTreeSet<String>) -> 
             let moved = (&new.position, &new.place, new.weighs)
                 != (&reading.position, &reading.place, reading.weighs);
             let model = if remedy == Remedy::Degrees {
-                // What it has beside it was computed from degrees, too.
+                // The twin's additional effort was computed from degrees, too.
                 trial.model(&new)
             } else if moved {
                 let urdf = trial.model(&new).into_iter().zip(&beside);
@@ -281,17 +284,18 @@ pub fn audit(problem: &Problem, is_scaled: bool, without: &BTreeSet<String>) -> 
     found
 }
 
-/// Whether efforts that look like another unit are torques of a robot with one wrong body: a decimal point that slipped.
+/// Whether one wrong body explains efforts that appear to be in another unit, such as a mass with a misplaced decimal
+/// point.
 pub fn is_one_body(problem: &Problem) -> bool {
     Trial::new(problem, true).is_one_body()
 }
 
-/// The direction of gravity in the base by which a robot would fit these efforts best, if it is not that of its model.
+/// Returns the direction of gravity in the base that fits these efforts best, if it differs from that of the model.
 pub fn turned_gravity(problem: &Problem) -> Option<[f64; 3]> {
     Trial::new(problem, true).turned_gravity().map(Into::into)
 }
 
-/// All remedies that can be tried on a reading.
+/// Returns the remedies that apply to a reading.
 fn candidates(n: usize, turns: &[bool], reading: &Reading) -> Vec<Remedy> {
     let mut all = Vec::new();
     for a in 0..n {
@@ -312,8 +316,9 @@ fn candidates(n: usize, turns: &[bool], reading: &Reading) -> Vec<Remedy> {
     all
 }
 
-/// By how much the error falls, as the logarithm of its factor, over all joints that told it before. Nothing if a joint or a
-/// recording says otherwise; a joint that told nothing before says so if it has got an effort that its motion leaves.
+/// Returns the logarithm of the error reduction, summed over the joints that were informative before. `None` if the
+/// error of a joint or a recording grows. A joint that was not informative before contradicts a remedy if it gets an
+/// effort that its motion does not explain.
 fn total_gain(before: &[Option<Left>], after: &[Option<Left>]) -> Option<f64> {
     let known = before.iter().zip(after);
     let known = known.filter_map(|(a, b)| a.as_ref().zip(b.as_ref()));

@@ -1,34 +1,34 @@
-//! Whether measured and computed efforts are those of one robot.
+//! Comparison of measured and computed efforts: whether they are those of one robot.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::data::problem::Problem;
 use crate::data::track::STANDSTILL_RAD_S;
 
-/// A joint is compared if the standard deviation of its twin's effort is at least this many times the noise.
+/// Smallest standard deviation of the twin's effort at a compared joint, in standard deviations of the noise.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const STRONG: f64 = 5.0;
-/// A joint follows the twin if the scaled effort explains at least this share of the variance that friction leaves.
+/// Smallest share of the variance after friction that the scaled effort of the twin explains at a matching joint.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const FOLLOWS: f64 = 0.15;
-/// A joint with fewer rows than this is not compared.
+/// Smallest number of rows of a compared joint.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_ROWS: usize = 20;
-/// Added to the diagonal of the normal equations, as a share of their trace.
+/// Ridge added to the diagonal of the normal equations, relative to their trace.
 /// Resolution: far above the rounding of f64, far below what the noise hides.
 const RIDGE: f64 = 1e-9;
 
-/// How measured efforts go with those that the motion requires.
+/// Agreement of measured efforts with those that the motion requires.
 #[derive(Debug, Clone)]
 pub struct Likeness {
-    /// Joints whose required effort stands out of the noise.
+    /// Number of joints whose required effort exceeds the noise.
     strong: usize,
-    /// By joint that follows the motion, measured over required effort.
+    /// Measured over required effort by joint that follows the motion.
     pub slopes: Vec<(usize, f64)>,
 }
 
 impl Likeness {
-    /// Of all joints.
+    /// Compares all joints.
     pub fn of(problem: &Problem) -> Self {
         let (mut strong, mut slopes) = (0, Vec::new());
         for joint in 0..problem.joints {
@@ -44,7 +44,7 @@ impl Likeness {
         Self { strong, slopes }
     }
 
-    /// The reason why these efforts allow no verdict, if they are not this robot's.
+    /// Returns the reason against a verdict if these efforts are not this robot's.
     pub fn of_another_robot(&self) -> Option<String> {
         let Self { strong, slopes } = self;
         let following = slopes.len();
@@ -59,7 +59,7 @@ impl Likeness {
     }
 }
 
-/// Share of a joint's measured variance that the twin's effort explains beside direction and speed, the slope, and
+/// Returns the share of a joint's measured variance after friction that the twin's effort explains, the slope, and
 /// the standard deviation of the twin's effort \[N m\].
 fn regression(problem: &Problem, joint: usize) -> (f64, f64, f64) {
     let rows = problem.joint_rows(joint);

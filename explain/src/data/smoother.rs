@@ -11,16 +11,16 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::read::recording::mean_step_s;
 
-/// Weight of a sample that is passed over, where others have 1. It is not 0, so that a long gap stays determined.
+/// Weight of an excluded sample; the others have 1. It is not 0, so that a long gap stays determined.
 /// Resolution: far below 1, so that nothing leaks, and far above the rounding of f64.
 const PASSED_OVER: f64 = 1e-6;
-/// Prior variance of the first state, over that of the measurement noise.
+/// Prior variance of the first state, relative to that of the measurement noise.
 /// Resolution: the prior then weighs 1e-4 of one sample.
 const DIFFUSE: f64 = 1e4;
 
-/// A low-pass with the response `1 / (1 + (f / fc)^6)`, prepared for one clock: solves
-/// `(W + λ Dᵀ D) y = W x` with D the third divided difference and W a weight per sample, 1 or next to 0. No phase
-/// shift, no transients at the ends; what has no weight is bridged and does not leak into the rest.
+/// A low-pass with the response `1 / (1 + (f / fc)^6)`, prepared for one clock: solves `(W + λ Dᵀ D) y = W x` with D
+/// the third divided difference and W a weight per sample, 1 or almost 0. It has no phase shift and no transients at
+/// the ends. Samples without weight are bridged and do not affect the others.
 #[derive(Debug, Clone)]
 pub struct LowPass {
     weight: Vec<f64>,
@@ -30,12 +30,12 @@ pub struct LowPass {
 }
 
 impl LowPass {
-    /// The filter with half amplitude at `cutoff_hz` for samples at `time_s` \[s\], strictly increasing.
+    /// Creates the filter with half amplitude at `cutoff_hz` for samples at `time_s` \[s\], strictly increasing.
     pub fn new(time_s: &[f64], cutoff_hz: f64) -> Self {
         Self::weighted(time_s, cutoff_hz, |_| true)
     }
 
-    /// The same, passing over the samples that are not `used`.
+    /// Creates the filter without the samples that are not `used`.
     pub fn weighted(time_s: &[f64], cutoff_hz: f64, used: impl Fn(usize) -> bool) -> Self {
         let n = time_s.len();
         let weight: Vec<f64> = (0..n)
@@ -99,7 +99,7 @@ impl LowPass {
     pub fn apply(&self, x: &mut [f64]) {
         let n = self.diagonal.len();
         assert_eq!(x.len(), n, "one number per sample");
-        // The newest of the three before comes last: each step waits for it alone.
+        // The newest of the three previous values is added last: only that operation waits for the previous step.
         let mut before = [0.0; 3];
         for ((x, l), weight) in x.iter_mut().zip(&self.bands).zip(&self.weight) {
             let rest = weight * *x - l[2] * before[2] - l[1] * before[1];
@@ -109,7 +109,7 @@ impl LowPass {
         for (value, pivot) in x.iter_mut().zip(&self.diagonal) {
             *value /= pivot;
         }
-        // Here the three after, each already times its own band.
+        // The contributions of the three values after, each multiplied by its band.
         let mut owed = [0.0; 3];
         for (x, l) in x.iter_mut().zip(&self.bands).rev() {
             *x -= owed[0];
@@ -131,7 +131,7 @@ pub struct MotionSmoother {
 }
 
 impl MotionSmoother {
-    /// The smoother with half amplitude at `cutoff_hz` for samples at `time_s` \[s\], strictly increasing.
+    /// Creates the smoother with half amplitude at `cutoff_hz` for samples at `time_s` \[s\], strictly increasing.
     pub fn new(time_s: &[f64], cutoff_hz: f64) -> Self {
         let n = time_s.len();
         let omega = TAU * cutoff_hz;
@@ -171,14 +171,14 @@ impl MotionSmoother {
         }
     }
 
-    /// Position, velocity and acceleration at each sample from measured positions.
+    /// Returns position, velocity and acceleration at each sample from measured positions.
     ///
     /// # Panics
     /// If `position` is not one number per sample of the clock.
     pub fn smooth(&self, position: &[f64]) -> Vec<Vector3<f64>> {
         assert_eq!(position.len(), self.gains.len(), "one position per sample");
         let mut states: Vec<Vector3<f64>> = Vec::with_capacity(position.len());
-        // About the first position, so that the wide prior does not pull towards zero.
+        // Relative to the first position, so that the wide prior does not pull towards zero.
         let origin = position.first().copied().unwrap_or(0.0);
         let mut state = Vector3::zeros();
         for (i, &measured) in position.iter().enumerate() {
@@ -230,7 +230,7 @@ mod tests {
             .collect()
     }
 
-    /// Amplitude of the response in the middle of a long sine.
+    /// Returns the gain of the filter in the middle of a long sine.
     fn response(jitter: f64, hz: f64) -> f64 {
         let time = clock(4000, jitter);
         let mut x: Vec<f64> = time.iter().map(|t| (TAU * hz * t).sin()).collect();

@@ -1,21 +1,21 @@
-//! Velocity of a joint at rest, smoothed separately.
+//! Velocity of a joint at standstill, smoothed separately.
 //!
-//! A joint that breaks loose leaves a corner in its position. A smoother rings at that corner, and the velocity of a few
-//! mrad/s before it gets the wrong sign. Friction then has the wrong sign, too, which is an error of several N m. So each
-//! standstill is smoothed by itself, with a lower cutoff.
+//! A joint that breaks away has a corner in its position. A smoother rings at that corner, so the velocity of a few
+//! mrad/s before it gets the wrong sign. Friction then has the wrong sign, too: an error of several N m. Therefore
+//! each standstill is smoothed separately, with a lower cutoff.
 
 use nalgebra::Vector3;
 
 use crate::data::noise::white_variance;
 use crate::data::smoother::MotionSmoother;
 
-/// A joint is at rest while it creeps slower than this \[rad/s\].
+/// Largest creep velocity of a joint at standstill \[rad/s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const CREEP_RAD_S: f64 = 0.006;
-/// Its positions may spread over this many standard deviations of the encoder's noise besides.
+/// Additional range of its positions, in standard deviations of the encoder's noise.
 /// Statistical: five samples of Gaussian noise spread further about once in 4500.
 const NOISE_SPAN: f64 = 6.0;
-/// Samples to either side whose spread is compared.
+/// Half width of the window whose range of positions is evaluated \[samples\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const REACH: usize = 2;
 /// Shortest standstill \[samples\].
@@ -28,8 +28,8 @@ const LEAST_S: f64 = 0.06;
 /// Tuned: by hand, on no recorded seeds; not swept.
 const CUTOFF_HZ: f64 = 4.0;
 
-/// Smooths each standstill in `position` by itself and writes its velocity into `states`. Accelerations stay as they
-/// are.
+/// Smooths each standstill in `position` separately and writes its velocity into `states`. Accelerations stay
+/// unchanged.
 pub fn resmooth(time_s: &[f64], position: &[f64], states: &mut [Vector3<f64>]) {
     let noise = white_variance(position).sqrt();
     let stands = |k: usize| {
@@ -66,7 +66,7 @@ mod tests {
     #[test]
     fn a_joint_that_breaks_loose_does_not_move_the_other_way_before() {
         let time: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
-        // Creeps at -1 mrad/s, then runs off at 15 rad/s².
+        // Creeps at -1 mrad/s, then accelerates at 15 rad/s².
         let position: Vec<f64> = time
             .iter()
             .map(|t| {

@@ -9,16 +9,16 @@ use crate::data::smoother::{LowPass, MotionSmoother};
 use crate::data::standstill;
 use crate::read::recording::Recording;
 
-/// A joint slower than this is at rest: its friction takes any value up to breakaway \[rad/s\].
+/// Speed below which a joint is at standstill: its friction takes any value up to breakaway \[rad/s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const STANDSTILL_RAD_S: f64 = 0.01;
-/// A joint that moves in less than this share of the time is compared at rest, too.
+/// Share of the time with motion below which a joint is compared at standstill, too.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_MOVING_SHARE: f64 = 0.2;
-/// The effort over this first part of a recording of an arm at rest is taken as free of temporary effects \[s\].
+/// Start of a recording of an arm at rest whose effort is treated as free of temporary effects \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const BEGINNING_S: f64 = 1.0;
-/// Thinned samples may be this much closer than the step, as a share of it, on an uneven clock.
+/// Smallest distance of thinned samples on an uneven clock, relative to the step.
 /// Resolution: an uneven clock keeps nearly its samples.
 const LEAST_OF_STEP: f64 = 0.9;
 
@@ -29,7 +29,7 @@ pub struct Track {
     pub name: String,
     /// Its start \[s from the start of the session\].
     pub session_s: f64,
-    /// \[s from its start\]
+    /// Time of each sample \[s from the start of the recording\].
     pub time_s: Vec<f64>,
     /// Smoothed position \[rad or m\].
     pub position: Vec<f64>,
@@ -39,15 +39,15 @@ pub struct Track {
     pub acceleration: Vec<f64>,
     /// The twin's effort \[N m or N\].
     pub rigid: Vec<f64>,
-    /// Effort of a corrected twin's terms that are not bodies \[the recording's unit\].
+    /// Effort of the corrected twin's terms that do not act on bodies \[the recording's unit\].
     pub beside: Vec<f64>,
-    /// Until when the beginning of an arm at rest is free of temporary effects \[s\].
+    /// Duration of the undisturbed start of an arm at rest \[s\].
     pub quiet_s: f64,
 }
 
 impl Track {
-    /// The motion of a recording at all its samples, and the twin's effort for it. The smoother has half amplitude at
-    /// `motion_cutoff_hz`. `constants` convert the recording's unit into the model's, by joint.
+    /// Smooths the motion of a recording at all its samples and computes the twin's effort for it. The smoother has
+    /// half amplitude at `motion_cutoff_hz`. `constants` convert the recording's unit into the model's, by joint.
     pub fn new(
         recording: &Recording,
         session_s: f64,
@@ -101,8 +101,8 @@ impl Track {
         track
     }
 
-    /// Replaces the velocity: by that of positions smoothed with another cutoff \[Hz\] or, without one, by the recorded
-    /// velocity. Standstills are smoothed by themselves. The twin's effort stays as it is.
+    /// Replaces the velocity by that of positions smoothed with another cutoff \[Hz\] or, without a cutoff, by the
+    /// recorded velocity. Standstills are smoothed separately. The twin's effort stays unchanged.
     pub(crate) fn sharpen_velocity(&mut self, recording: &Recording, cutoff_hz: Option<f64>) {
         if recording.is_of_poses() {
             return;
@@ -125,8 +125,8 @@ impl Track {
         }
     }
 
-    /// Shifts the twin's effort for an arm at rest so that it begins at the measured effort. Load, friction and offset
-    /// cannot be told apart there.
+    /// Shifts the twin's effort for an arm at rest so that it begins at the measured effort: load, friction and
+    /// offset are indistinguishable there.
     pub fn start_at_measured(&mut self, recording: &Recording, unit_nm: &[f64]) {
         let n = unit_nm.len();
         if recording.effort.is_empty() || self.is_empty() {
@@ -158,7 +158,7 @@ impl Track {
         self.time_s.is_empty()
     }
 
-    /// Keeps the samples of these indices.
+    /// Returns the track with the samples at these indices.
     pub(crate) fn thin(&self, keep: &[usize], n: usize) -> Self {
         let rows = |from: &[f64]| -> Vec<f64> {
             keep.iter()
@@ -217,21 +217,21 @@ impl Track {
 pub struct FitTrack {
     /// The motion, thinned.
     pub track: Track,
-    /// By joint. Each passes over the samples that are not compared there.
+    /// Filter by joint, without the samples that are not compared there.
     pub(crate) filters: Vec<LowPass>,
     /// Samples at which filtered signals are compared.
     pub compared: Vec<usize>,
-    /// Where they begin in the rows of the problem.
+    /// Index of the first of these samples in the rows of the problem.
     pub first_row: usize,
 }
 
 impl FitTrack {
-    /// Rows of the problem that are this track's.
+    /// Returns the rows of the problem that belong to this track.
     pub fn rows(&self) -> std::ops::Range<usize> {
         self.first_row..self.first_row + self.compared.len()
     }
 
-    /// Filters one joint's signal on the track's clock and writes what is compared.
+    /// Filters one joint's signal on the track's clock and writes its compared samples.
     pub fn compare(&self, joint: usize, mut signal: Vec<f64>, into: &mut [f64]) {
         self.filters[joint].apply(&mut signal);
         for (value, &k) in into.iter_mut().zip(&self.compared) {
@@ -240,7 +240,8 @@ impl FitTrack {
     }
 }
 
-/// Which joints move in at least [`LEAST_MOVING_SHARE`] of the time. The others are compared at rest, too.
+/// Returns by joint whether it moves in at least [`LEAST_MOVING_SHARE`] of the time. The others are compared at
+/// standstill, too.
 pub(crate) fn moving_joints<'a>(tracks: impl Iterator<Item = &'a Track>, n: usize) -> Vec<bool> {
     let (mut moving, mut samples) = (vec![0_usize; n], 0);
     for track in tracks {
@@ -253,7 +254,7 @@ pub(crate) fn moving_joints<'a>(tracks: impl Iterator<Item = &'a Track>, n: usiz
     moving.iter().map(share).collect()
 }
 
-/// Indices of samples at least [`LEAST_OF_STEP`] times `step_s` apart.
+/// Returns the indices of samples at least [`LEAST_OF_STEP`] times `step_s` apart.
 pub(crate) fn thinned(time_s: &[f64], step_s: f64) -> Vec<usize> {
     let mut kept = Vec::new();
     let mut next = f64::NEG_INFINITY;
@@ -266,7 +267,7 @@ pub(crate) fn thinned(time_s: &[f64], step_s: f64) -> Vec<usize> {
     kept
 }
 
-/// Indices of the samples nearest to an even grid of `step_s`.
+/// Returns the indices of the samples that follow the points of an even grid of `step_s`.
 pub(crate) fn spaced(time_s: &[f64], step_s: f64) -> Vec<usize> {
     let mut kept = Vec::new();
     let mut at = time_s[0] + 0.5 * step_s;

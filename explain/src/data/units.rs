@@ -5,15 +5,16 @@ use tauscope_dynamics::{Data, gravity_effort};
 use crate::read::input::Input;
 use crate::read::start::Start;
 
-/// A torque scale that is at least this many times its standard deviation is used where a guess is better than none.
+/// Ratio of a torque scale to its standard deviation above which it is used where an estimate is better than none.
 /// Statistical: its 95 % interval then leaves out zero (1.96, rounded up).
 const LIKELY: f64 = 2.0;
-/// A joint bears weight if gravity loads it with at least this share of the most loaded joint's torque.
+/// Smallest gravity torque of a loaded joint, relative to that of the most loaded joint.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const BEARS: f64 = 0.1;
 
 impl Start {
-    /// N m per recorded unit by joint, where the gains stand for torque constants; 1 where a gain tells nothing.
+    /// Returns N m per recorded unit by joint, where the gains are inverse torque constants; 1 where a gain is not
+    /// identifiable.
     pub fn units_nm(&self) -> Vec<f64> {
         let of = |joint| {
             if self.is_scale_known(joint) {
@@ -25,8 +26,8 @@ impl Start {
         (0..self.gain.len()).map(of).collect()
     }
 
-    /// The most likely N m per recorded unit by joint, where the gains stand for torque constants. A joint whose gain is
-    /// not identifiable gets the median of the others.
+    /// Returns the most likely N m per recorded unit by joint, where the gains are inverse torque constants. A joint
+    /// whose gain is not identifiable gets the median of the others.
     pub fn likely_units_nm(&self) -> Vec<f64> {
         let gains = self.gain.iter().zip(&self.gain_deviation);
         let told = gains.map(|(gain, deviation)| (*gain > LIKELY * deviation).then(|| 1.0 / gain));
@@ -34,7 +35,7 @@ impl Start {
     }
 }
 
-/// The known scales, with their median in place of the unknown ones; 1 if none is known.
+/// Replaces the unknown scales by the median of the known ones; 1 if none is known.
 fn filled(known: &[Option<f64>]) -> Vec<f64> {
     let mut told: Vec<f64> = known.iter().copied().flatten().collect();
     told.sort_by(f64::total_cmp);
@@ -42,8 +43,8 @@ fn filled(known: &[Option<f64>]) -> Vec<f64> {
     known.iter().map(|unit| unit.unwrap_or(middle)).collect()
 }
 
-/// About how many N m a recorded unit is, by joint: the gravity torque of an arm at rest over the measured effort.
-/// Friction bears part of the weight, so forces that depend on this are only about right.
+/// Estimates N m per recorded unit by joint: the gravity torque of an arm at rest over the measured effort. Friction
+/// bears part of the weight, so forces that depend on this are approximate.
 fn units_under_gravity(input: &Input) -> Vec<f64> {
     let n = input.model.dof();
     let mut data = Data::new(&input.model);
@@ -69,7 +70,7 @@ fn units_under_gravity(input: &Input) -> Vec<f64> {
     filled(&(0..n).map(unit).collect::<Vec<_>>())
 }
 
-/// N m per recorded unit by joint, and the joints where it is unknown, each with the gain that its fit starts from.
+/// Returns N m per recorded unit by joint, and the joints where it is unknown, each with the initial gain of its fit.
 pub fn scales(input: &Input, constants: &[f64], at_rest: bool) -> (Vec<f64>, Vec<(usize, f64)>) {
     if input.effort_unit != "A" || input.torque_constants_nm_per_a.is_some() {
         return (constants.to_vec(), Vec::new());
@@ -78,7 +79,7 @@ pub fn scales(input: &Input, constants: &[f64], at_rest: bool) -> (Vec<f64>, Vec
     let Some(start) = &input.start else {
         let likely = units_under_gravity(input);
         let gains = likely.iter().map(|unit| 1.0 / unit).enumerate().collect();
-        // At rest nothing else would tell them.
+        // At rest, gravity is the only source of the scale.
         let units_nm = if at_rest { likely } else { constants.to_vec() };
         return (units_nm, gains);
     };

@@ -1,4 +1,4 @@
-//! The search for an arm at rest: temporary effects can be found, lasting ones cannot.
+//! Search for an arm at rest: temporary effects are identifiable, lasting ones are not.
 
 use tauscope_dynamics::terms::TermError;
 use tauscope_dynamics::terms::words::number;
@@ -16,31 +16,33 @@ use crate::read::recording::Recording;
 use crate::report::findings;
 use tauscope_dynamics::kinematic_tree::bearing;
 
-/// The residual stands out where it is this many times its standard deviation at the beginning, over all joints.
+/// Smallest residual of a push over all joints, in standard deviations at the start of the recording.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const STANDS_OUT: f64 = 8.0;
-/// It must also be this share of its peak within [`NEAR_S`], because friction holds part of a push for long.
+/// Smallest residual of a push, relative to its peak within [`NEAR_S`], because friction retains part of a push for a
+/// long time.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SHARE_OF_PEAK: f64 = 0.3;
-/// The peak is searched within this time on either side \[s\].
+/// Time on either side within which the peak is searched \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const NEAR_S: f64 = 1.0;
-/// A push lasts at least this long, and two that are nearer together are one \[s\].
+/// Shortest push, and shortest time between two pushes \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SHORTEST_S: f64 = 0.15;
-/// A push loads a joint if its mean residual is this many times the standard deviation at the beginning.
+/// Smallest mean residual of a joint loaded by a push, in standard deviations at the start of the recording.
 /// Statistical: Gaussian noise goes beyond four standard deviations once in 16 000 samples.
 const FELT: f64 = 4.0;
-/// It must also be this share of the residual of the most loaded joint.
+/// Smallest mean residual of a joint loaded by a push, relative to the most loaded joint.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const FELT_SHARE: f64 = 0.015;
-/// A residual that stands out for more than this share of the time is no push. The effort then changes while the
-/// positions do not, as when a driver does not publish them.
+/// Share of the time above which a large residual is not a push. The effort then changes while the positions do not,
+/// as when a driver does not publish them.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MOST_OF_TIME: f64 = 0.7;
 
-/// Standard deviation of the residual at each joint over the beginning of a problem's only recording \[N m or N\]. Where
-/// that is cut short by a push, it is that about its own mean over most parts of the recording as long as a beginning.
+/// Returns the standard deviation of the residual at each joint over the start of a problem's only recording
+/// \[N m or N\]. If a push cuts the start short, it is the median over parts of the recording of that length, each
+/// about its own mean.
 fn deviations(problem: &Problem, fit: &Fit) -> Vec<f64> {
     let track = &problem.tracks[0];
     let time = |k: usize| track.track.time_s[track.compared[k]];
@@ -78,13 +80,13 @@ fn deviations(problem: &Problem, fit: &Fit) -> Vec<f64> {
     (0..problem.joints).map(of).collect()
 }
 
-/// The intervals in which the residual stands out, in a problem's only recording \[s of recording time\].
+/// Returns the intervals with a large residual in a problem's only recording \[s of recording time\].
 fn stands_out(problem: &Problem, fit: &Fit, deviations: &[f64]) -> Vec<(f64, f64)> {
     let track = &problem.tracks[0];
     let times: Vec<f64> = (track.compared.iter())
         .map(|&k| track.track.time_s[k])
         .collect();
-    // In N m. If it were divided by the noise, friction at the joint with the finest sensor would decide.
+    // In N m: divided by the noise, friction at the joint with the finest sensor would dominate.
     let norm: Vec<f64> = (0..times.len())
         .map(|row| {
             let of = |j: usize| {
@@ -95,7 +97,7 @@ fn stands_out(problem: &Problem, fit: &Fit, deviations: &[f64]) -> Vec<(f64, f64
         })
         .collect();
     let noise = deviations.iter().map(|d| d * d).sum::<f64>().sqrt();
-    // The peak since the residual was last small: what friction holds of a push is not another push.
+    // The peak since the residual was last small: what friction retains of a push is not another push.
     let held = norm.iter().scan(0.0_f64, |most, x| {
         *most = if *x > STANDS_OUT * noise {
             most.max(*x)
@@ -114,7 +116,7 @@ fn stands_out(problem: &Problem, fit: &Fit, deviations: &[f64]) -> Vec<(f64, f64
     };
     let mut found: Vec<(f64, f64)> = Vec::new();
     for (k, &t) in times.iter().enumerate().filter(|(k, _)| stands_out(*k)) {
-        // A sample stands for the time until the next.
+        // A sample represents the time until the next one.
         let until = times.get(k + 1).copied().unwrap_or(t);
         match found.last_mut() {
             Some((_, end)) if t - *end < SHORTEST_S => *end = until,
@@ -125,7 +127,8 @@ fn stands_out(problem: &Problem, fit: &Fit, deviations: &[f64]) -> Vec<(f64, f64
     found
 }
 
-/// The joint furthest from the base that is loaded in an interval. A push does not load the joints beyond it.
+/// Returns the joint furthest from the base that is loaded in an interval. A push does not load the joints beyond the
+/// link on which it acts.
 fn last_to_feel(
     problem: &Problem,
     fit: &Fit,
@@ -149,14 +152,14 @@ fn last_to_feel(
         .max_by_key(|j| order(problem, *j))
 }
 
-/// The number of joints from the base to one, itself included.
+/// Returns the number of joints from the base to `joint`, itself included.
 fn order(problem: &Problem, joint: usize) -> usize {
     let model = &problem.model;
     bearing(model, model.joints()[joint].child_link).len()
 }
 
-/// One push for each interval in which the residual stands out. Its link is the one where a constant force explains most
-/// of the residual, among the links next to the last joint that is loaded.
+/// Fits one push for each interval with a large residual. Its link is the one where a constant force explains most of
+/// the residual, among the links next to the last loaded joint.
 fn pushes(problem: &Problem, hypotheses: &[Hypothesis], bodies: bool) -> Fit {
     let none = Fit::new(problem, Vec::new());
     let deviations = deviations(problem, &none);
@@ -186,7 +189,7 @@ fn pushes(problem: &Problem, hypotheses: &[Hypothesis], bodies: bool) -> Fit {
 }
 
 impl Context<'_> {
-    /// Searches each recording by itself for temporary effects. Returns the reason if there is no verdict.
+    /// Searches each recording separately for temporary effects. Returns the reason if there is no verdict.
     pub fn at_rest(
         &self,
         progress: &(dyn Fn(f64, &str) + Sync),
@@ -195,7 +198,7 @@ impl Context<'_> {
         let joints: Vec<String> = input.model.joint_names().map(str::to_owned).collect();
         let rests_count = vec![true; joints.len()];
         let mut hypotheses = self.hypotheses();
-        // What is there through a whole recording, or longer, is part of its load.
+        // An effect that lasts for a whole recording or longer is part of the load.
         let passes = |h: &Hypothesis| {
             let stays = h.effect.traits.fills_recording || h.effect.traits.in_session;
             h.time_kind() == TimeKind::Once && !stays
@@ -211,7 +214,7 @@ impl Context<'_> {
             let found = pushes(&problem, &hypotheses, input.bodies);
             let inferred = inference::around(&problem, &hypotheses, found, input.bodies);
             let mut own = findings::of(&problem, &inferred, &before, self, &joints);
-            // No further motion tells more about a push that is over.
+            // No further motion adds information on a push that is over.
             own.next_motions.clear();
             own.trajectories.clear();
             named.extend(own);
@@ -225,15 +228,15 @@ impl Context<'_> {
             return Ok(Err(Stop::Reason(reason.to_owned())));
         }
         named.notes.push(format!(
-            "No joint moves, so lasting effects cannot be told from the load at rest. The effort in the first {BEGINNING_S} s of each \
-             recording, or until it changes, is taken as the usual load of that pose."
+            "No joint moves, so lasting effects cannot be distinguished from the load. The effort in the first {BEGINNING_S} s of each \
+             recording, or until it changes, is treated as the load of that pose."
         ));
         if !self.unscaled.is_empty() {
             let of =
                 |&(j, _): &(usize, f64)| format!("{} {} N m/A", joints[j], number(self.unit_nm[j]));
             let taken: Vec<String> = self.unscaled.iter().map(of).collect();
             named.notes.push(format!(
-                "The torque constants of these drives are not known. Forces are only as right as these assumed values: {}.",
+                "The torque constants of these drives are unknown. Forces are only as accurate as these assumed values: {}.",
                 taken.join(", ")
             ));
         }

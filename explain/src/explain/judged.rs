@@ -11,24 +11,24 @@ use crate::report::schema::Undetectable;
 pub struct Judged {
     /// The recordings that were fitted.
     pub problem: Problem,
-    /// The twin as it was, with its unknown torque scales fitted.
+    /// The initial twin, with its unknown torque scales fitted.
     pub before: Fit,
-    /// The twin with the effects that were found.
+    /// The twin with the effects of the explanation.
     pub found: Fit,
     /// The findings.
     pub named: Named,
-    /// The smallest effects that would have been found.
+    /// Detection limits of the effects.
     pub undetectable: Vec<Undetectable>,
-    /// Joints that keep the twin as it was.
+    /// Joints that keep the initial twin.
     pub kept: Vec<usize>,
     /// Features that predict the residual of the fitted recordings.
     pub remaining: Vec<Predicted>,
 }
 
-/// Why a search did not begin.
+/// Reason why a search did not begin.
 pub enum Stop {
     /// The recordings allow no verdict.
     Reason(String),
-    /// They must be mended first.
+    /// The recordings must be corrected first.
     Slips(Vec<Slip>),
 }

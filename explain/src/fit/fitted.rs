@@ -1,4 +1,4 @@
-//! An explanation with its numbers: the effort that it computes for the recordings, and the residual.
+//! An explanation with its parameters: the effort that it computes for the recordings, and the residual.
 
 use std::sync::{Arc, OnceLock};
 
@@ -12,14 +12,14 @@ use crate::physics::columns::columns;
 use crate::physics::efforts::change;
 use crate::physics::parts::Parts;
 
-/// A variance below this is taken for this, so that its inverse and its logarithm are finite \[squared effort\].
+/// Lower bound of a variance, so that its inverse and its logarithm are finite \[squared effort\].
 /// Physical: 1e-8 N m is far below what any sensor resolves.
 pub(crate) const LEAST_VARIANCE: f64 = 1e-16;
 
-/// An explanation with its numbers, and the residual.
+/// An explanation with its parameters, and the residual.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// The effects with their numbers.
+    /// The effects with their parameters.
     pub actives: Vec<Active>,
     /// The effort that each effect adds.
     pub parts: Parts,
@@ -36,12 +36,12 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Evaluates an explanation without changing its numbers.
+    /// Evaluates an explanation at its parameters.
     pub fn new(problem: &Problem, actives: Vec<Active>) -> Self {
         Self::beside(problem, actives, None)
     }
 
-    /// The same. Efforts that are unchanged since the fit `before` are taken from there.
+    /// Evaluates an explanation at its parameters. Unchanged efforts are taken from the fit `before`.
     pub(crate) fn beside(problem: &Problem, actives: Vec<Active>, before: Option<&Self>) -> Self {
         let known = before.map(|before| (&before.actives[..], &before.parts));
         let parts = Parts::new(problem, &actives, known);
@@ -84,17 +84,17 @@ impl Fit {
         fit
     }
 
-    /// The computed efforts, unfiltered.
+    /// Returns the computed efforts, unfiltered.
     pub fn efforts(&self, problem: &Problem) -> &Efforts {
         self.parts.efforts(problem, &self.actives)
     }
 
-    /// The effort that the gears transmit, unfiltered.
+    /// Returns the effort that the gears transmit, unfiltered.
     pub fn load(&self, problem: &Problem) -> Arc<TrackEfforts> {
         self.parts.load(problem, &self.actives)
     }
 
-    /// The columns of a hypothesis at some shape, in addition to the effects of the fit.
+    /// Returns the columns of a hypothesis at given nonlinear parameters, in addition to the effects of the fit.
     pub fn columns(
         &self,
         problem: &Problem,
@@ -104,7 +104,7 @@ impl Fit {
         columns(problem, (&self.actives, &self.parts), hypothesis, shape)
     }
 
-    /// The effort that another effect would add.
+    /// Returns the effort that another effect would add.
     pub fn added(&self, problem: &Problem, active: &Active) -> Column {
         let on = (&self.parts.gains[..], self.parts.carrier.as_deref());
         let joint = active.hypothesis.only_joint();
@@ -121,7 +121,7 @@ impl Fit {
         problem.column(&changed, joint)
     }
 
-    /// The effort of each effect: the residual without it minus the residual with it.
+    /// Returns the effort of each effect: the residual without it minus the residual with it.
     pub fn own_efforts(&self, problem: &Problem) -> &[Column] {
         let all: Vec<usize> = (0..self.actives.len()).collect();
         let of = |&index: &usize| {
@@ -135,7 +135,7 @@ impl Fit {
         self.own.get_or_init(|| parallel::map(&all, of))
     }
 
-    /// The fit without some of its effects, not refined.
+    /// Returns the fit without some of its effects, not refined.
     #[must_use]
     pub fn without(&self, problem: &Problem, indices: &[usize]) -> Self {
         let all = self.actives.iter().enumerate();

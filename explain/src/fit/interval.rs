@@ -1,4 +1,4 @@
-//! 95 % intervals of the numbers of an explanation, from their covariance.
+//! 95 % intervals of the parameters of an explanation, from their covariance.
 
 use nalgebra::DMatrix;
 use tauscope_dynamics::terms::CoordinateKind;
@@ -8,27 +8,28 @@ use crate::fit::fitted::Fit;
 use crate::physics::active::Active;
 use crate::physics::parameter_units::unit;
 
-/// Standard deviation of a number from smoothing and differentiation, as a share of the number.
+/// Relative standard deviation of a parameter from smoothing and differentiation.
 /// Tuned: on arms simulated by another engine, on no recorded seeds; not swept.
 const SYSTEMATIC: f64 = 0.003;
-/// The same for effects in the fastest part of the motion: around reversals and in the spring of a gear.
+/// Relative standard deviation of effects in the fastest part of the motion: around reversals and in the spring of a
+/// gear.
 /// Tuned: on arms simulated by another engine, on no recorded seeds; not swept.
 const SYSTEMATIC_WHEN_FAST: f64 = 0.02;
-/// A change this near to a gap may lie within the gap, in periods of the cutoff.
+/// Distance from a gap below which a change may lie within the gap, in periods of the cutoff.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const NEAR_GAP_PERIODS: f64 = 0.5;
 /// Half width of a 95 % interval of a normal variable, in standard deviations.
 /// Statistical: the 97.5 % quantile of the standard normal distribution.
 pub const HALF_WIDTH_95: f64 = 1.96;
-/// Step of the difference quotient of a parameter, as a share of its coordinate's standard deviation.
-/// Resolution: between the curvature over a long step and the rounding over a short one.
+/// Step of a parameter's difference quotient, relative to its coordinate's standard deviation.
+/// Resolution: between the truncation error of a long step and the rounding error of a short one.
 const STEP_OF_DEVIATION: f64 = 1e-3;
-/// The same as a share of the coordinate, where its standard deviation is tiny.
+/// Lower bound of that step, relative to the coordinate, where its standard deviation is tiny.
 /// Resolution: above the rounding of f64.
 const LEAST_RELATIVE_STEP: f64 = 1e-9;
 
-/// Standard deviations of the parameters of one effect, from the covariance of its coordinates. Systematic errors are
-/// added: of smoothing and differentiation, and of a time that lies anywhere between two rows.
+/// Returns the standard deviations of the parameters of one effect, from the covariance of its coordinates.
+/// Systematic errors are added: of smoothing and differentiation, and of a time that lies anywhere between two rows.
 pub fn parameter_deviations(
     problem: &Problem,
     fit: &Fit,
@@ -49,7 +50,7 @@ pub fn parameter_deviations(
     }
     let centre = active.parameters();
     let effect = active.hypothesis.effect;
-    // A curve has more numbers than names.
+    // A curve has more coordinates than named parameters.
     let is_angle = |row: usize| {
         let parameter = effect.parameters.get(row);
         parameter.is_some_and(|parameter| unit(parameter.name) == "rad")
@@ -99,8 +100,8 @@ fn is_time(kind: CoordinateKind) -> bool {
     )
 }
 
-/// The time between the two rows that an effect's time lies between \[s\]. Only rows that are compared at its joint
-/// count. A time beside a gap may lie within the gap, because the filter bridges gaps.
+/// Returns the time between the two rows that enclose an effect's time \[s\], among the rows compared at its joint. A
+/// time next to a gap may lie within the gap, because the filter bridges gaps.
 fn between_rows(problem: &Problem, active: &Active, c: usize) -> f64 {
     let of_session = active.kind(c) == CoordinateKind::SessionTime;
     let joint = active.hypothesis.only_joint();

@@ -1,4 +1,4 @@
-//! How the effort of an explanation changes with each of its numbers.
+//! Derivatives of the effort of an explanation with respect to its parameters.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
@@ -13,34 +13,34 @@ use crate::physics::active::Active;
 use crate::physics::efforts::record;
 use crate::physics::parts::is_kept;
 
-/// Step of the difference quotient of a shape, as a share of its range. Small, because a wall or a limit begins at a
-/// point.
-/// Resolution: between the curvature over a long step and the rounding over a short one.
+/// Step of a nonlinear parameter's difference quotient, relative to its range. It is small because the effort of a
+/// wall or a limit has a kink.
+/// Resolution: between the truncation error of a long step and the rounding error of a short one.
 const SHAPE_STEP: f64 = 1e-5;
-/// Step of the difference quotient of a time \[s\].
+/// Step of a time's difference quotient \[s\].
 /// Resolution: about one sample.
 const TIME_STEP_S: f64 = 0.01;
 
 impl Fit {
-    /// The coordinates that are free, as (index of the active, index of the coordinate).
+    /// Returns the free coordinates as (index of the active, index of the coordinate).
     pub fn parameters(&self) -> Vec<(usize, usize)> {
         let all = self.actives.iter().enumerate();
         all.flat_map(|(i, active)| (0..active.coordinates.len()).map(move |c| (i, c)))
             .collect()
     }
 
-    /// How the explained effort changes with each free coordinate.
+    /// Returns the derivative of the explained effort with respect to each free coordinate.
     pub fn jacobian(&self, problem: &Problem) -> Vec<Arc<Column>> {
         let of = |i: usize| self.sensitivities(problem, i);
         (0..self.actives.len()).flat_map(of).collect()
     }
 
-    /// Whether a coordinate is a factor.
+    /// Whether a coordinate is a linear coefficient.
     pub fn is_factor(&self, index: usize, c: usize) -> bool {
         matches!(self.actives[index].kind(c), CoordinateKind::Factor { .. })
     }
 
-    /// Derivatives of the explained effort with respect to the coordinates of an active.
+    /// Returns the derivatives of the explained effort with respect to the coordinates of an active.
     fn sensitivities(&self, problem: &Problem, index: usize) -> Vec<Arc<Column>> {
         let active = &self.actives[index];
         let hypothesis = active.hypothesis;
@@ -50,7 +50,7 @@ impl Fit {
             let joint = Some(joint);
             return vec![Arc::new(Column { joint, values })];
         }
-        // What a factor adds is the same wherever all factors are.
+        // The effort is linear in the coefficients, so their derivatives do not depend on them.
         let alike = is_kept(problem, active) && !active.is_of_record();
         let known = alike.then(|| self.columns(problem, hypothesis, &active.shape()));
         let factors = hypothesis.factors();
@@ -65,7 +65,8 @@ impl Fit {
         (0..active.coordinates.len()).map(one).collect()
     }
 
-    /// The difference quotient of one coordinate. `here` keeps what the effect adds where it is, for its other coordinates.
+    /// Returns the difference quotient of one coordinate. `here` caches the effort of the effect at its parameters
+    /// for its other coordinates.
     fn sensitivity(
         &self,
         problem: &Problem,
@@ -116,7 +117,7 @@ impl Fit {
     }
 }
 
-/// Step of the difference quotient of a coordinate.
+/// Returns the step of a coordinate's difference quotient.
 pub(crate) fn step_of(problem: &Problem, active: &Active, c: usize) -> f64 {
     let value = active.coordinates[c];
     match active.kind(c) {

@@ -1,4 +1,4 @@
-//! Runs terms and robots over the recordings.
+//! Evaluation of terms and robots over the recordings.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::data::efforts::TrackEfforts;
 use crate::data::problem::Problem;
 use crate::data::track::FitTrack;
 
-/// The efforts `start` after `terms` have acted on them.
+/// Returns the efforts `start` after `terms` have acted on them.
 pub fn run(problem: &Problem, terms: Vec<Box<dyn Term>>, start: &[Vec<f64>]) -> TrackEfforts {
     if terms.is_empty() {
         return start.to_vec();
@@ -21,7 +21,8 @@ pub fn run(problem: &Problem, terms: Vec<Box<dyn Term>>, start: &[Vec<f64>]) -> 
         .collect()
 }
 
-/// The efforts `start` over all tracks after a term has acted on them, with the efforts that the gears transmit.
+/// Returns the efforts `start` over all tracks after a term has acted on them, with the efforts that the gears
+/// transmit.
 pub fn act_over(
     problem: &Problem,
     term: &mut dyn Term,
@@ -44,7 +45,8 @@ pub fn act_over(
     out
 }
 
-/// Effort of a model over the motion of all tracks or, if not `moving`, the effort against gravity alone.
+/// Computes the effort of a model over the motion of all tracks or, if not `moving`, the effort against gravity
+/// alone.
 pub fn over_tracks(problem: &Problem, model: &Model, moving: bool) -> TrackEfforts {
     let mut data = Data::new(model);
     let mut of = |track: &FitTrack| {
@@ -61,7 +63,7 @@ pub fn over_tracks(problem: &Problem, model: &Model, moving: bool) -> TrackEffor
     problem.tracks.iter().map(&mut of).collect()
 }
 
-/// What a robot costs along the recorded motion, for [`Term::know_recorded`].
+/// Computes the effort of a robot along the recorded motion, for [`Term::know_recorded`].
 pub fn recorded(problem: &Problem, model: &Model) -> Arc<Vec<f64>> {
     Arc::new(over_tracks(problem, model, true).concat())
 }

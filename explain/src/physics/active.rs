@@ -1,4 +1,4 @@
-//! One effect of an explanation: its kind, its place and its numbers.
+//! One effect of an explanation: its kind, its place and its parameters.
 
 use tauscope_dynamics::terms::{
     Against, Coordinate, CoordinateKind, Effect, Family, Layer, PlaceKind, Table, Term, table,
@@ -16,7 +16,7 @@ pub const BODY: usize = 10;
 /// The scale between a joint's torque and its recorded effort, see `torque_scale.rs`.
 pub const TORQUE_SCALE: &str = "torque_scale";
 
-/// An effect at a place, without its numbers.
+/// An effect at a place, without parameters.
 #[derive(Debug, Clone, Copy)]
 pub struct Hypothesis {
     /// The kind of effect.
@@ -32,7 +32,7 @@ impl PartialEq for Hypothesis {
 }
 
 impl Hypothesis {
-    /// The effect with these coordinates.
+    /// Returns the effect with these coordinates.
     pub fn with(self, coordinates: Vec<f64>) -> Active {
         Active {
             hypothesis: self,
@@ -41,14 +41,14 @@ impl Hypothesis {
         }
     }
 
-    /// The one joint whose effort it changes, if there is only one.
+    /// Returns the only joint whose effort it changes, if there is just one.
     pub fn only_joint(&self) -> Option<usize> {
         let at_joint = matches!(self.effect.place, PlaceKind::Joint | PlaceKind::TwoJoints);
         (at_joint && (self.effect.layer != Layer::Body || self.is_torque_scale()))
             .then_some(self.place.joint)
     }
 
-    /// Whether it depends on what the gear transmits.
+    /// Whether it depends on the effort that the gear transmits.
     pub fn needs_load(&self) -> bool {
         self.effect.traits.needs_load
     }
@@ -63,12 +63,12 @@ impl Hypothesis {
         self.effect.name == TORQUE_SCALE
     }
 
-    /// Whether it adds what one joint does to another joint's effort.
+    /// Whether it couples the effort of one joint into the recording of another.
     pub fn is_coupling(&self) -> bool {
         self.effect.place == PlaceKind::TwoJoints
     }
 
-    /// Whether it splits a joint into rotor and link. Such effects take long to evaluate.
+    /// Whether it splits a joint into rotor and link. Such effects are slow to evaluate.
     pub fn has_rotor(&self) -> bool {
         self.effect.splits_joint()
     }
@@ -78,7 +78,7 @@ impl Hypothesis {
         self.effect.is_plain_friction()
     }
 
-    /// Whether every joint with a gear has it: plain friction and a rotor.
+    /// Whether every joint with a gear has it: plain friction or a rotor.
     pub fn is_ordinary(&self) -> bool {
         let is_rotor = self.effect.family == Family::Transmission && self.is_linear();
         self.is_plain_friction() || is_rotor && self.only_joint() == Some(self.place.joint)
@@ -89,17 +89,17 @@ impl Hypothesis {
         self.effect.traits.shifts_time
     }
 
-    /// How it depends on time.
+    /// Returns its dependence on time.
     pub fn time_kind(&self) -> TimeKind {
         self.effect.time()
     }
 
-    /// Whether it is part of the arm, not something that came and went.
+    /// Whether it is a lasting property of the arm, not a temporary event.
     pub fn lasts(&self) -> bool {
         self.effect.lasts()
     }
 
-    /// Its name in reports; `unknown` for an effect that only describes.
+    /// Returns its name in reports; `unknown` for an effect that only describes.
     pub fn said(&self) -> &'static str {
         self.effect.said()
     }
@@ -109,12 +109,12 @@ impl Hypothesis {
         self.effect.traits.describes_only && self.effect.family == Family::Body
     }
 
-    /// Whether all its coordinates are factors.
+    /// Whether all its coordinates are linear coefficients.
     pub fn is_linear(&self) -> bool {
         self.factors().len() == self.effect.coordinates.len()
     }
 
-    /// Indices of the coordinates that are factors.
+    /// Returns the indices of the coordinates that are linear coefficients.
     pub fn factors(&self) -> Vec<usize> {
         let is_factor = |c: &Coordinate| matches!(c.kind, CoordinateKind::Factor { .. });
         let coordinates = self.effect.coordinates.iter().enumerate();
@@ -125,19 +125,19 @@ impl Hypothesis {
     }
 }
 
-/// An effect at a place with its numbers.
+/// An effect at a place with its parameters.
 #[derive(Debug, Clone)]
 pub struct Active {
     /// The effect and its place.
     pub hypothesis: Hypothesis,
     /// Values of the effect's coordinates. For a curve: its values at the knots that are not held at zero.
     pub coordinates: Vec<f64>,
-    /// The curve of an `unknown` effect: its knots and what it is a function of. Its own values are not used.
+    /// The curve of an `unknown` effect: its knots and its argument. Its own values are not used.
     pub curve: Option<Table>,
 }
 
 impl Active {
-    /// The term for a robot.
+    /// Builds the term for a robot.
     pub fn term(&self, model: &Model) -> Box<dyn Term> {
         let site = self.hypothesis.place.site(model);
         let curve = self.curve.as_ref().and_then(|curve| {
@@ -154,7 +154,7 @@ impl Active {
         curve.unwrap_or_else(|| (self.hypothesis.effect.build)(&site, &self.coordinates))
     }
 
-    /// The values of its curve at all knots.
+    /// Returns the values of its curve at all knots.
     pub fn values_at_knots(&self, curve: &Table) -> Vec<f64> {
         let held = held_knots(curve, self.hypothesis.place.joint);
         let mut free = self.coordinates.iter();
@@ -165,7 +165,7 @@ impl Active {
         (0..curve.knots.len()).map(&mut value).collect()
     }
 
-    /// Whether it depends on what the gear transmits.
+    /// Whether it depends on the effort that the gear transmits.
     pub fn needs_load(&self) -> bool {
         match &self.curve {
             Some(curve) => curve.against.is_of_load(),
@@ -183,7 +183,7 @@ impl Active {
         self.hypothesis.is_coupling()
     }
 
-    /// Its coordinates with all factors at zero.
+    /// Returns its coordinates with all linear coefficients at zero: the nonlinear parameters.
     pub fn shape(&self) -> Vec<f64> {
         let mut shape = self.coordinates.clone();
         for i in self.hypothesis.factors() {
@@ -192,13 +192,13 @@ impl Active {
         shape
     }
 
-    /// How a coordinate enters.
+    /// Returns the kind of a coordinate.
     pub fn kind(&self, coordinate: usize) -> CoordinateKind {
         let of_effect = self.hypothesis.effect.coordinates.get(coordinate);
         of_effect.map_or(Coordinate::factor("value_nm").kind, |c| c.kind)
     }
 
-    /// The body that it adds or changes, if any, and the URDF's body of that link.
+    /// Returns the body that it adds or changes, if any, and the URDF's body of that link.
     pub fn body(&self, model: &Model) -> Option<(Inertia, Option<Inertia>)> {
         let ten = Inertia::from_parameters(*self.coordinates.first_chunk::<BODY>()?);
         if self.hypothesis.is_unnamed_body() {
@@ -208,18 +208,18 @@ impl Active {
         self.hypothesis.is_body().then_some((ten, None))
     }
 
-    /// Whether it is a curve over the time since a start that another run does not share.
+    /// Whether it is a curve over the time since a start, which another run does not share.
     pub fn is_curve_over_time(&self) -> bool {
         matches!(&self.curve, Some(curve) if curve.against.is_of_start())
     }
 
-    /// Its parameters, as reports hold them.
+    /// Returns its parameters as they appear in reports.
     pub fn parameters(&self) -> Vec<f64> {
         (self.hypothesis.effect.to_parameters)(&self.coordinates)
     }
 }
 
-/// Whether a coupling adds a joint's effort to another joint's recording.
+/// Whether a coupling adds this joint's effort to another joint's recording.
 pub fn feeds(actives: &[Active], joint: usize) -> bool {
     let couplings = actives.iter().filter(|active| active.is_coupling());
     couplings
@@ -227,17 +227,19 @@ pub fn feeds(actives: &[Active], joint: usize) -> bool {
         .any(|source| source == joint)
 }
 
-/// Effects in the order in which they act within their layer: torque scales last.
+/// Returns the effects in the order in which they act within their layer: torque scales last.
 pub fn in_order(actives: &[Active]) -> Vec<&Active> {
     let mut all: Vec<&Active> = actives.iter().collect();
     all.sort_by_key(|active| active.hypothesis.is_torque_scale());
     all
 }
 
-/// The knots of a joint's curve that are held at zero. A curve over the joint's own velocity is what remains beside Coulomb
-/// and viscous friction. These two make a straight line in each direction, so the slowest and the fastest knot of each
-/// direction are held at zero. So are those of the others where friction or an offset stands beside them: no load, the
-/// middle of a hysteresis, long after a standstill, and far from a turn.
+/// Returns the knots of a joint's curve that are held at zero, because friction or an offset already describes that
+/// part.
+///
+/// A curve over the joint's own velocity is the remaining friction after Coulomb and viscous friction. These two are
+/// a straight line in each direction, so the slowest and the fastest knot of each direction are held at zero. Held
+/// knots of other curves: no load, the middle of a hysteresis, long after a standstill, and far from a reversal.
 pub fn held_knots(curve: &Table, joint: usize) -> Vec<usize> {
     let last = curve.knots.len() - 1;
     match curve.against {

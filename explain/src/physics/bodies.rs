@@ -1,5 +1,5 @@
-//! Effort of bodies over the recordings: a linear combination of the efforts of unit inertias and unit gravity, which are
-//! computed once.
+//! Effort of bodies over the recordings: a linear combination of the efforts of unit inertias and unit gravity, which
+//! are computed once.
 
 use std::sync::Arc;
 
@@ -13,8 +13,8 @@ use crate::physics::act::{act_over, over_tracks, recorded};
 use crate::physics::active::Active;
 use crate::physics::carrier::{Carrier, is_on_carrier};
 
-/// Adds the effort of an effect on bodies to efforts over all tracks. `rigid` is the twin's effort, `carrier` the robots
-/// with the bodies and the tilt that were found, if there are any.
+/// Adds the effort of an effect on bodies to efforts over all tracks. `rigid` is the twin's effort. `carrier` holds
+/// the robots with the bodies and the tilt of the explanation, if there are any.
 pub fn add(
     problem: &Problem,
     active: &Active,
@@ -51,7 +51,8 @@ pub fn add(
     }
 }
 
-/// Effort of 1 kg m² of rotor inertia at a joint: the first factor of effects that split a joint into rotor and link.
+/// Returns the effort of 1 kg m² of rotor inertia at a joint: the first linear coefficient of effects that split a
+/// joint into rotor and link.
 pub fn rotor(problem: &Problem, joint: usize) -> TrackEfforts {
     let mut effort = zeros(&problem.bare().body);
     for (track, effort) in problem.tracks.iter().zip(&mut effort) {
@@ -62,7 +63,7 @@ pub fn rotor(problem: &Problem, joint: usize) -> TrackEfforts {
     effort
 }
 
-/// Effort of an effect on bodies as a signal, if it is a linear combination of unit efforts.
+/// Returns the effort of an effect on bodies as a signal, if it is a linear combination of unit efforts.
 pub fn signal(problem: &Problem, active: &Active) -> Option<Vec<f64>> {
     let (unit, factors) = in_units(problem, &*active.term(&problem.model))?;
     let signals = problem.units.signals.get_or(unit, || {
@@ -78,7 +79,7 @@ pub fn signal(problem: &Problem, active: &Active) -> Option<Vec<f64>> {
     Some(sum)
 }
 
-/// The units and their coefficients for a term, if its effort is linear in units that may be kept.
+/// Returns the units and their coefficients for a term, if its effort is linear in units that may be cached.
 fn in_units(problem: &Problem, term: &dyn Term) -> Option<(Unit, Vec<f64>)> {
     if problem.rows > MOST_ROWS {
         return None;
@@ -91,12 +92,12 @@ fn in_units(problem: &Problem, term: &dyn Term) -> Option<(Unit, Vec<f64>)> {
     let (before, after) = (problem.model.gravity(), altered.gravity());
     let change = after.iter().zip(before);
     let change: Vec<f64> = change.map(|(after, before)| after - before).collect();
-    // What alters the robot but not gravity is no combination of units.
+    // A change of the robot other than gravity is not a combination of units.
     let is_of_gravity = is_altered && change.iter().any(|change| *change != 0.0);
     is_of_gravity.then_some((Unit::Gravity, change))
 }
 
-/// Adds the effort of an inertia that a term adds at a link for a while.
+/// Adds the effort of a temporary inertia that a term adds at a link.
 fn add_for_a_while(problem: &Problem, term: &dyn Term, link: usize, into: &mut [Vec<f64>]) {
     let units = units(problem, Unit::Inertia(link));
     for (r, (track, into)) in problem.tracks.iter().zip(into).enumerate() {

@@ -23,7 +23,7 @@ fn terms_of(problem: &Problem, actives: &[Active], layer: Layer) -> Vec<Box<dyn 
     of_layer.map(|active| active.term(&problem.model)).collect()
 }
 
-/// The effort that the gears transmit with the effects `actives`.
+/// Computes the effort that the gears transmit with the effects `actives`.
 pub fn transmitted(problem: &Problem, actives: &[Active]) -> TrackEfforts {
     let rigid = &problem.bare().body;
     let mut body = TrackEfforts::clone(rigid);
@@ -40,7 +40,7 @@ pub fn transmitted(problem: &Problem, actives: &[Active]) -> TrackEfforts {
     body
 }
 
-/// The efforts of all layers with the effects `actives`, whose gears transmit `body`.
+/// Computes the efforts of all layers with the effects `actives`, whose gears transmit `body`.
 pub fn evaluated(problem: &Problem, actives: &[Active], body: Arc<TrackEfforts>) -> Efforts {
     let mechanical = run(problem, terms_of(problem, actives, Layer::Joint), &body);
     let recorded = record(problem, actives, &mechanical);
@@ -51,7 +51,7 @@ pub fn evaluated(problem: &Problem, actives: &[Active], body: Arc<TrackEfforts>)
     }
 }
 
-/// The recorded effort of mechanical efforts.
+/// Computes the recorded effort from mechanical efforts.
 pub fn record(problem: &Problem, actives: &[Active], mechanical: &[Vec<f64>]) -> TrackEfforts {
     run(
         problem,
@@ -60,10 +60,10 @@ pub fn record(problem: &Problem, actives: &[Active], mechanical: &[Vec<f64>]) ->
     )
 }
 
-/// The change of the recorded effort when `active` is added to the effects `others` that made `efforts`. The effort of
-/// bodies is scaled by `gains`; what moves or tilts them acts on `carrier`.
+/// Computes the change of the recorded effort when `active` is added to the effects `others`, which result in
+/// `efforts`. The effort of bodies is scaled by `gains`; effects that move or tilt them act on `carrier`.
 ///
-/// [`Layer::Record`] terms of `others` are passed through; one that is itself of that layer acts after them.
+/// [`Layer::Record`] terms of `others` act on the change; an `active` of that layer acts after them.
 pub fn change(
     problem: &Problem,
     others: &[Active],
@@ -98,7 +98,8 @@ pub fn change(
     recorded_on_top(problem, others, efforts, &added, 1.0)
 }
 
-/// The same for an effect of a joint's effort or of its recording, at the only joint that it changes: one number a sample.
+/// Computes that change for an effect on a joint's effort or on its recording, at the only joint that it changes: one
+/// number per sample.
 pub fn change_at(
     problem: &Problem,
     others: &[Active],
@@ -150,10 +151,10 @@ pub fn change_at(
         .collect()
 }
 
-/// The terms of `actives` that transform what is recorded at a joint.
+/// Returns the terms of `actives` that transform the recorded effort of a joint.
 fn record_terms_at(problem: &Problem, actives: &[Active], joint: usize) -> Vec<Box<dyn Term>> {
     let of_record = actives.iter().filter(|active| active.is_of_record());
-    // A coupling reads another joint's effort as it is recorded there.
+    // A coupling uses the recorded effort of another joint.
     let coupled = of_record.clone().any(Active::is_coupling);
     let is_elsewhere = |active: &Active| {
         let own = active.hypothesis.only_joint();
@@ -163,7 +164,7 @@ fn record_terms_at(problem: &Problem, actives: &[Active], joint: usize) -> Vec<B
     of_joint.map(|active| active.term(&problem.model)).collect()
 }
 
-/// The change of the recorded effort when `share` times `added` is added to the mechanical efforts.
+/// Computes the change of the recorded effort when `share` times `added` is added to the mechanical efforts.
 pub fn recorded_on_top(
     problem: &Problem,
     others: &[Active],

@@ -7,14 +7,14 @@ use tauscope_dynamics::terms::{EFFECTS, Effect, PlaceKind, UNKNOWN};
 
 use crate::physics::active::{Hypothesis, Whereabouts};
 
-/// Plain friction of a joint that may be less than the twin's by any amount.
+/// Returns plain friction of a joint with an unlimited possible decrease.
 pub fn any_plain_friction() -> BTreeMap<&'static str, f64> {
     let plain = EFFECTS.iter().filter(|effect| effect.is_plain_friction());
     plain.map(|effect| (effect.name, f64::INFINITY)).collect()
 }
 
-/// The hypotheses that describe without naming a cause: a curve at each joint, and where `bodies` are known, each link's
-/// body.
+/// Returns the hypotheses that describe without naming a cause: a curve at each joint, and where `bodies` are known,
+/// each link's body.
 pub fn unnamed(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Vec<Hypothesis> {
     let curve = |joint: usize| Hypothesis {
         effect: &UNKNOWN,
@@ -30,8 +30,8 @@ pub fn unnamed(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Vec<H
     all
 }
 
-/// Unnamed bodies exist for each moving link that has a body in the URDF, except for the last link, where every additional
-/// body is a payload.
+/// Returns an unnamed body for each moving link that has a body in the URDF, except for the last link, where every
+/// additional body is a payload.
 pub fn unnamed_bodies(model: &Model, without: &BTreeSet<String>) -> Vec<Hypothesis> {
     let describes =
         |effect: &&&Effect| effect.traits.describes_only && effect.place == PlaceKind::Link;
@@ -59,13 +59,13 @@ pub fn unnamed_bodies(model: &Model, without: &BTreeSet<String>) -> Vec<Hypothes
     links.map(at).collect()
 }
 
-/// Every hypothesis for a robot, except for the effects named in `without`. `bodies` is false where the twin is a topic,
-/// because masses and links are then not known.
+/// Returns every hypothesis for a robot, except for the effects named in `without`. `bodies` is false for an external
+/// twin, whose masses and links are unknown.
 pub fn hypotheses(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Vec<Hypothesis> {
     let joints = 0..model.dof();
     let mut all = Vec::new();
     for &effect in EFFECTS {
-        // Where the twin is a topic, its own friction and load are not known, and imitate finer kinds of friction.
+        // The unknown friction and load of an external twin imitate rare kinds of friction.
         let is_blurred = effect.traits.is_off_list && !bodies;
         if is_blurred || effect.traits.describes_only || without.contains(effect.name) {
             continue;
@@ -92,7 +92,7 @@ pub fn hypotheses(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Ve
                 }
             }
             PlaceKind::Link if bodies => {
-                // One link of each joint stands for all that is fixed to it.
+                // One link of each joint represents all links fixed to it.
                 for joint in joints.clone() {
                     add(Whereabouts {
                         link: model.body_link(joint),

@@ -10,7 +10,8 @@ use crate::physics::friction;
 use crate::read::start::Start;
 
 impl Start {
-    /// Coulomb and viscous friction by joint and name, in units of its terms. They may have decreased by up to this since.
+    /// Returns Coulomb and viscous friction by joint and name, in units of its terms. They may have decreased by up
+    /// to this since.
     pub fn friction(&self, model: &Model) -> Vec<BTreeMap<&'static str, f64>> {
         let mut all = vec![BTreeMap::new(); model.dof()];
         for spec in &self.terms {
@@ -22,10 +23,10 @@ impl Start {
         all
     }
 
-    /// Adds the twin's bodies to the rigid effort of a track, and its other terms to `beside`, so that a new body has the
-    /// same scale as the old ones. `loads` are new bodies that the gears bear, too. `constants` convert the recording's
-    /// unit into the model's. `gain` is each joint's factor on the effort of bodies, from the model's unit into the
-    /// recording's.
+    /// Adds the twin's bodies to the rigid effort of a track, and stores the effort of its other terms separately, so
+    /// that a new body has the same scale as the old ones. `loads` are new bodies that the gears bear, too.
+    /// `constants` convert the recording's unit into the model's. `gain` is each joint's factor on the effort of
+    /// bodies, from the model's unit into the recording's.
     ///
     /// # Errors
     /// If a term cannot be built for the robot.

@@ -1,4 +1,4 @@
-//! The scale between N m and a recorded current, where the torque constants are not known.
+//! Scale between N m and a recorded current where the torque constants are unknown.
 
 use tauscope_dynamics::terms::{
     Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, MotionSample, Parameter,
@@ -7,14 +7,15 @@ use tauscope_dynamics::terms::{
 
 use crate::physics::active::{Active, Hypothesis, TORQUE_SCALE, Whereabouts};
 
-/// Multiplies the effort of the bodies by 1 + x. It is not a finding, but every fit needs it. It acts after all other
+/// Scales the effort of the bodies by 1 + x. It is not a finding, but part of every fit. It acts after all other
+/// [`Layer::Body`] terms.
 /// [`Layer::Body`] terms.
 pub static EFFECT: Effect = Effect {
     name: TORQUE_SCALE,
     words: Words::new(
         "Torque scale",
         "torque scale",
-        "What a recorded effort of 1 is in N m.",
+        "Factor between the torque in N m and the recorded effort.",
         "",
         "The effort of joint {place} is recorded {gain} times the model's.",
     ),
@@ -23,7 +24,7 @@ pub static EFFECT: Effect = Effect {
     layer: Layer::Body,
     odds_nats: 0.0,
     parameters: &[Parameter::ratio("gain", 0.0)],
-    // A motor's torque has the sign of its current; a driver that turns it is a fault of the recording.
+    // A motor's torque has the sign of its current; the opposite sign is a fault of the recording.
     coordinates: &[Coordinate {
         name: "gain_minus_one",
         kind: CoordinateKind::Factor {
@@ -67,7 +68,7 @@ impl Term for TorqueScale {
     }
 }
 
-/// The unknown torque scales with the values that a fit starts from.
+/// Returns the unknown torque scales with their initial values.
 pub fn unknown_scales(first: &[(usize, f64)]) -> Vec<Active> {
     let one = |&(joint, gain): &(usize, f64)| {
         let place = Whereabouts {
@@ -83,7 +84,7 @@ pub fn unknown_scales(first: &[(usize, f64)]) -> Vec<Active> {
     first.iter().map(one).collect()
 }
 
-/// The torque scale of each joint in an explanation; 1 where it is not fitted.
+/// Returns the torque scale of each joint in an explanation; 1 where it is not fitted.
 pub fn gains(actives: &[Active], joints: usize) -> Vec<f64> {
     let mut gains = vec![1.0; joints];
     for active in actives

@@ -1,4 +1,4 @@
-//! What a curve in a joint is tried against, and where its knots are.
+//! Arguments of the curves that are tried in a joint, and their knots.
 
 use tauscope_dynamics::JointKind;
 use tauscope_dynamics::terms::{Against, Gauge, MotionSample, Table};
@@ -8,36 +8,37 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::physics::active::Active;
 
-/// Knots of a curve.
+/// Number of knots of a curve.
 /// Resolution: of a curve with a few bends.
 const KNOTS: usize = 10;
-/// Knots that a curve must have at different places.
+/// Smallest number of distinct knots of a curve.
 /// Statistical: two knots are a straight line, which effects of the library already describe.
 const LEAST_KNOTS: usize = 3;
-/// Knots nearer than this share of their mean spacing are merged.
+/// Distance below which knots are merged, relative to their mean spacing.
 /// Resolution: of the knots.
 const LEAST_SPACING: f64 = 0.2;
-/// Friction between two joints changes its sign within this share of their fastest motion against each other.
+/// Relative velocity of two joints within which the friction between them changes its sign, as a share of the
+/// fastest.
 /// Resolution: as for standstills, 0.01 rad/s, of a motion at 0.5 rad/s.
 const JUMP_SHARE: f64 = 0.02;
-/// Bands of a hysteresis that are tried, in standard deviations of the load.
+/// Hysteresis bands of the grid, in standard deviations of the load.
 /// Resolution: steps of about three; the knots resolve what lies between.
 const HYSTERESIS: [f64; 3] = [0.1, 0.3, 1.0];
-/// Knots of a hysteresis to either side of its middle.
+/// Number of knots of a hysteresis to either side of its middle.
 /// Resolution: straight in between, so half the band is resolved.
 const KNOTS_OF_SIDE: usize = 2;
-/// First knot after a standstill \[s\]; each further one comes after twice the time.
+/// First knot after a standstill; each further one is at twice the time \[s\].
 /// Resolution: near the comparison's fastest response, 1 / (2 pi 8 Hz) = 0.02 s, and its spacing of 0.06 s.
 const FIRST_S: f64 = 0.1;
-/// What a standstill does has passed after this time \[s\].
+/// Time after which the effect of a standstill has decayed \[s\].
 /// Physical: brakes, lubricants and springs settle within seconds; what takes longer is seen over the session.
 const SETTLED_S: f64 = 10.0;
 
-/// Knots of a curve over the way since the last turn: the first lies at 1/64 of the joint's range.
+/// Number of knots of a curve over the travel since the last reversal; the first is at 1/64 of the joint's range.
 /// Resolution: a thirtieth of a radian on a range of two; what winds up by less is friction at rest.
 const OCTAVES: u32 = 7;
 
-/// Curves to try in a joint.
+/// Returns the curves that are tried in a joint.
 pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
     let mut all = Vec::new();
     let mut add = |against: Against, of_joint: usize, knots: Vec<f64>, signs: &[bool]| {
@@ -59,10 +60,10 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
         |against, of_joint, count| even_quantiles(readings(problem, against, of_joint), count);
     let position = even(Against::Position, joint, KNOTS);
     add(Against::Position, joint, position, &[false, true]);
-    // Friction jumps at standstill, so over the velocity only curves that change sign with the direction of motion are tried.
+    // Friction jumps at standstill, so curves over the velocity change sign with the direction of motion.
     let velocity = even(Against::Velocity, joint, KNOTS);
     add(Against::Velocity, joint, velocity, &[true]);
-    // Parts that rub on each other feel how fast they move against each other.
+    // Friction between two moving parts depends on their relative velocity.
     if !problem.is_foreign && is_comparable_to_next(problem, joint) {
         for against in [Against::VelocityDifference, Against::VelocitySum] {
             let speeds = with_jump(even(against, joint, KNOTS));
@@ -79,21 +80,21 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
     }
     let rested = since_rest_knots(problem, joint);
     add(Against::SinceRest, joint, rested, &[false, true]);
-    // What winds up at each turn acts against the motion.
+    // An effort that builds up after each reversal opposes the motion.
     add(
         Against::SinceTurn,
         joint,
         since_turn_knots(problem, joint),
         &[true],
     );
-    // A straight line: what bends over the session cannot be told from slow noise.
+    // A straight line, because curvature over the session cannot be distinguished from slow noise.
     if let Some(ends) = session_ends(problem, joint) {
         add(Against::SessionTime, joint, ends.to_vec(), &[false, true]);
     }
     all
 }
 
-/// Knots of hystereses of several bands \[N m or N\], where the joint bears a load that changes.
+/// Returns the knots of hystereses with several bands \[N m or N\], where the joint bears a load that changes.
 fn hysteresis_knots(problem: &Problem, joint: usize) -> Vec<Vec<f64>> {
     let spread = deviation(&readings(problem, Against::Load, joint));
     let sides = 0..=2 * KNOTS_OF_SIDE;
@@ -105,7 +106,8 @@ fn hysteresis_knots(problem: &Problem, joint: usize) -> Vec<Vec<f64>> {
     bands.filter(|band| *band > 0.0).map(of_band).collect()
 }
 
-/// Times since the last rest \[s\], each twice the one before, as far as the joint moves.
+/// Returns the knots over the time since the last standstill \[s\], each twice the one before, as far as the joint
+/// moves.
 fn since_rest_knots(problem: &Problem, joint: usize) -> Vec<f64> {
     let since_rest = readings(problem, Against::SinceRest, joint);
     let longest = since_rest.iter().copied().filter(|t| *t < SETTLED_S);
@@ -115,7 +117,8 @@ fn since_rest_knots(problem: &Problem, joint: usize) -> Vec<f64> {
     std::iter::once(0.0).chain(times).collect()
 }
 
-/// Ways since the last turn \[rad or m\], each twice the one before, as far as the joint moves in one direction.
+/// Returns the knots over the travel since the last reversal \[rad or m\], each twice the one before, as far as the
+/// joint moves in one direction.
 fn since_turn_knots(problem: &Problem, joint: usize) -> Vec<f64> {
     let position = readings(problem, Against::Position, joint);
     let least = position.iter().copied().fold(f64::INFINITY, f64::min);
@@ -124,7 +127,7 @@ fn since_turn_knots(problem: &Problem, joint: usize) -> Vec<f64> {
     std::iter::once(0.0).chain(ways.rev()).collect()
 }
 
-/// The first and the last time of the session \[s\], where it lasts.
+/// Returns the first and the last time of the session \[s\], if they differ.
 fn session_ends(problem: &Problem, joint: usize) -> Option<[f64; 2]> {
     let session = readings(problem, Against::SessionTime, joint);
     let first = session.iter().copied().fold(f64::INFINITY, f64::min);
@@ -138,7 +141,7 @@ fn is_comparable_to_next(problem: &Problem, joint: usize) -> bool {
     joint + 1 < problem.joints && slides(joint) == slides(joint + 1)
 }
 
-/// What a curve could be drawn against, at all samples.
+/// Returns the argument of a curve at all samples.
 fn readings(problem: &Problem, against: Against, of_joint: usize) -> Vec<f64> {
     let mut values = Vec::new();
     for track in &problem.tracks {
@@ -149,7 +152,7 @@ fn readings(problem: &Problem, against: Against, of_joint: usize) -> Vec<f64> {
     values
 }
 
-/// `count` even quantiles of `values`; those that are too near to each other are merged.
+/// Returns `count` even quantiles of `values`; those that are too close to each other are merged.
 fn even_quantiles(mut values: Vec<f64>, count: usize) -> Vec<f64> {
     values.sort_by(f64::total_cmp);
     let last = values.len() - 1;
@@ -159,7 +162,7 @@ fn even_quantiles(mut values: Vec<f64>, count: usize) -> Vec<f64> {
     knots
 }
 
-/// Knots of which the one nearest to zero is moved there.
+/// Moves the knot nearest to zero to zero.
 fn with_zero(mut knots: Vec<f64>) -> Vec<f64> {
     let nearest = (0..knots.len()).min_by(|a, b| knots[*a].abs().total_cmp(&knots[*b].abs()));
     if let Some(nearest) = nearest {
@@ -168,7 +171,7 @@ fn with_zero(mut knots: Vec<f64>) -> Vec<f64> {
     knots
 }
 
-/// Knots with two beside zero in place of those that are nearer to it, so that a curve can jump there as friction does.
+/// Replaces the knots near zero by two on either side of it, so that a curve can jump there as friction does.
 fn with_jump(mut knots: Vec<f64>) -> Vec<f64> {
     let [Some(first), Some(last)] = [knots.first().copied(), knots.last().copied()] else {
         return knots;
@@ -183,7 +186,7 @@ fn with_jump(mut knots: Vec<f64>) -> Vec<f64> {
     knots
 }
 
-/// Standard deviation.
+/// Returns the standard deviation.
 fn deviation(values: &[f64]) -> f64 {
     let count = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / count;
@@ -191,7 +194,7 @@ fn deviation(values: &[f64]) -> f64 {
     (squares / count).sqrt()
 }
 
-/// The effort of a unit at each free knot of a curve, in addition to the effects of `fit`.
+/// Returns the effort of a unit value at each free knot of a curve, in addition to the effects of `fit`.
 pub(crate) fn knot_columns(problem: &Problem, fit: &Fit, curve: &Active) -> Vec<Column> {
     let free = curve.coordinates.len();
     let unit = |k: usize| {

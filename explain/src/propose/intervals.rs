@@ -1,10 +1,11 @@
-//! Intervals of a log that are searched for an effect that acts for a while.
+//! Intervals of a log that are searched for a temporary effect.
 
-/// Steps per recording on which changes are searched, and intervals at least.
+/// Number of steps per recording on which changes are searched. Intervals have more steps in long recordings.
 /// Resolution: times are refined afterwards.
 pub const STEPS: usize = 100;
-/// Of a recording with more than [`STEPS`] steps, intervals of more than this many steps are searched on twice the step,
-/// so that the shortest are found in a log of any length and the work grows no faster than the log.
+/// Length in steps above which intervals of a recording with more than [`STEPS`] steps are searched at twice the
+/// step. So the shortest intervals are found in a log of any length, and the work grows at most linearly with the
+/// log.
 /// Resolution: the ends of an interval are searched to within a twentieth of its length.
 const FINE_STEPS: usize = 40;
 /// An interval in steps.
@@ -12,19 +13,19 @@ const FINE_STEPS: usize = 40;
 pub struct Steps {
     /// First step.
     pub from: usize,
-    /// The step after the last one.
+    /// Step after the last one.
     pub to: usize,
 }
 
 impl Steps {
-    /// Whether they have a step in common.
+    /// Whether both contain a common step.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.from < other.to && other.from < self.to
     }
 }
 
-/// The intervals of at least `shortest` steps that are searched among so many: all of few; of many, the longer the
-/// coarser.
+/// Returns the searched intervals of at least `shortest` steps among `steps`: all if there are few steps, otherwise
+/// longer ones on a coarser grid.
 pub fn intervals(steps: usize, shortest: usize) -> Vec<Steps> {
     let mut all = Vec::new();
     let mut stride = 1;
@@ -49,7 +50,7 @@ pub fn intervals(steps: usize, shortest: usize) -> Vec<Steps> {
 mod tests {
     use super::*;
 
-    /// How much of both together the best of the searched intervals shares with this one.
+    /// Returns the largest intersection over union of a searched interval with this one.
     fn overlap(all: &[Steps], from: usize, to: usize) -> f64 {
         let share = |other: &Steps| {
             let common = other.to.min(to).saturating_sub(other.from.max(from));

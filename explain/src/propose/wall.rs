@@ -1,4 +1,4 @@
-//! Where a wall could be: from the force at the end of the arm that explains the residual.
+//! Proposed walls: from the force at the end of the arm that explains the residual.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use tauscope_dynamics::kinematic_tree::moving_link;
@@ -8,24 +8,25 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::{Fit, LEAST_VARIANCE};
 use crate::physics::active::Hypothesis;
 
-/// A sample belongs to a contact if the best force there reduces the sum of squares over the variance by this much.
+/// Smallest reduction of the sum of squares over the variance by the best force at a contact sample.
 /// Statistical: white noise exceeds it in one of 700 000 samples (chi-square, three degrees of freedom).
 const EVIDENT: f64 = 30.0;
 /// Quantiles of the depth of the contact samples at which the wall's surface is tried.
 /// Resolution: the surface is refined afterwards.
 const SURFACES: [f64; 3] = [0.0, 0.1, 0.4];
-/// Added to the diagonal of a sample's normal equations, as a share of their trace: the arm does not feel a force in
-/// every direction.
-/// Resolution: far below what the arm feels.
+/// Ridge added to the diagonal of a sample's normal equations, relative to their trace: some directions of a force
+/// cause no joint torque.
+/// Resolution: far below the observable directions.
 const RIDGE: f64 = 1e-3;
-/// A shorter sum of forces has no direction \[N\].
+/// Smallest sum of forces with a direction \[N\].
 /// Resolution: guards a division by zero; far below any measured force.
 const LEAST_FORCE_N: f64 = 1e-9;
 
-/// Walls to try, with their stiffness at zero: the normal is the direction of the force, the surface is where it begins.
+/// Returns the walls to try, with zero stiffness: the normal is the direction of the force, the surface is where it
+/// begins.
 ///
-/// Contact samples are found in two ways. Forces that stand out of the residual show a wall that the arm touches
-/// now and then. Forces that stand out of the white noise show one that it leans on nearly all the time.
+/// Contact samples are found in two ways. Forces above the residual indicate a wall that the arm touches now and
+/// then. Forces above the white noise indicate a wall in nearly permanent contact.
 pub fn shapes(problem: &Problem, fit: &Fit, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
     let noise = problem.white_noise.iter();
     let noise: Vec<f64> = noise
@@ -36,13 +37,13 @@ pub fn shapes(problem: &Problem, fit: &Fit, hypothesis: Hypothesis) -> Vec<Vec<f
     [&fit.variance, &noise].into_iter().flat_map(of).collect()
 }
 
-/// Walls at the contact samples of one link.
+/// Returns the walls at the contact samples of one link.
 fn walls(contacts: &[(Point3<f64>, Vector3<f64>)]) -> Vec<Vec<f64>> {
     let along = |total: Vector3<f64>| Some(-total.try_normalize(LEAST_FORCE_N)?);
     let Some(mean) = along(contacts.iter().map(|(_, force)| force).sum()) else {
         return Vec::new();
     };
-    // Forces are uncertain in directions that the arm cannot feel: those against the wall say nothing of it.
+    // Forces are uncertain in directions without joint torque, so those towards the wall are ignored.
     let agreeing = contacts.iter().filter(|(_, force)| force.dot(&mean) < 0.0);
     let Some(direction) = along(agreeing.map(|(_, force)| force).sum()) else {
         return Vec::new();
@@ -58,7 +59,8 @@ fn walls(contacts: &[(Point3<f64>, Vector3<f64>)]) -> Vec<Vec<f64>> {
         .into()
 }
 
-/// Samples at which a force on a link stands out of `variance`: position of the link's frame \[m\] and force \[N\].
+/// Returns the samples with a significant force on a link, given `variance`: position of the link's frame \[m\] and
+/// force \[N\].
 fn contacts(
     problem: &Problem,
     fit: &Fit,
@@ -106,8 +108,8 @@ mod tests {
     use crate::physics::active::{Hypothesis, Whereabouts};
     use tauscope_dynamics::kinematic_tree::{bearing, moving_link, reach_m};
 
-    /// Stiffness \[N/m\] and offset \[m\] of the wall that is found where the arm presses on a floor of 800 N/m at
-    /// -0.62 m.
+    /// Returns stiffness \[N/m\] and offset \[m\] of the estimated wall for an arm that presses on a floor of 800 N/m
+    /// at -0.62 m.
     fn found(urdf: &str) -> (f64, f64) {
         let model = Model::from_urdf(urdf).unwrap();
         let place = Whereabouts {
@@ -141,7 +143,7 @@ mod tests {
         (parameters[0], parameters[4])
     }
 
-    /// The same robot with its joints in another order and with two sliding fingers on its last link.
+    /// Returns the robot of [`URDF`] with its joints in another order and two sliding fingers on its last link.
     fn shuffled_with_a_gripper() -> String {
         let start = URDF.find("  <joint name=\"shoulder\"").unwrap();
         let middle = URDF.find("  <joint name=\"elbow\"").unwrap();

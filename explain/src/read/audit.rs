@@ -1,21 +1,20 @@
-//! Checks whether the recordings allow a verdict, and counts what was lost on reading them.
+//! Audit of the recordings: whether they allow a verdict, and the losses on reading.
 
 use tauscope_session::by_recording;
 
 use crate::read::input::{FOR_ONE_HELD_OUT, Input};
 use crate::read::recording::Recording;
 
-/// A joint moves if it does so further than this in some recording: a push bends even an arm that holds still
-/// \[rad or m\].
+/// Smallest range of a moving joint in some recording: a push bends even an arm that holds still \[rad or m\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_RANGE: f64 = 0.05;
-/// A recording with fewer samples than this is too short.
+/// Smallest number of samples of a recording.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_SAMPLES: usize = 50;
-/// A recording shorter than this is too short \[s\].
+/// Shortest recording \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_DURATION_S: f64 = 1.0;
-/// The reason why these recordings allow no verdict, if there is one. Nothing has been fitted yet.
+/// Returns the reason against a verdict before any fit, if there is one.
 pub fn before(input: &Input) -> Option<String> {
     if let Some(recording) = input.fit.iter().find(|r| r.effort.is_empty()) {
         return Some(format!("recording {} holds no effort", recording.name));
@@ -65,14 +64,14 @@ pub fn is_frozen(recording: &Recording, n: usize) -> bool {
     (0..n).all(|j| range(recording, j, n) <= 0.0)
 }
 
-/// Whether a joint's effort stays the same to the last bit while the joint moves: nobody measures it.
+/// Whether a joint's effort is constant to the last bit while the joint moves, so it is not measured.
 pub fn is_unmeasured(recording: &Recording, joint: usize, n: usize) -> bool {
     let mut efforts = recording.effort.iter().skip(joint).step_by(n);
     let first = efforts.next();
     range(recording, joint, n) > LEAST_RANGE && efforts.all(|effort| Some(effort) == first)
 }
 
-/// How far a joint moves in a recording \[rad or m\].
+/// Returns the range of a joint's positions in a recording \[rad or m\].
 fn range(recording: &Recording, joint: usize, n: usize) -> f64 {
     let positions = recording.position.iter().skip(joint).step_by(n);
     let ends = (f64::INFINITY, f64::NEG_INFINITY);
@@ -80,8 +79,8 @@ fn range(recording: &Recording, joint: usize, n: usize) -> f64 {
     high - low
 }
 
-/// Faults of each recording, a sentence each: the findings on reading, the unused parts, and the clock that stamps were
-/// put on.
+/// Returns the faults of each recording, one sentence each: the findings on reading, the unused parts, and the clock
+/// on which the samples were placed.
 pub fn losses(input: &Input) -> Vec<String> {
     let recordings = || input.fit.iter().chain(&input.holdout);
     let found: Vec<_> = recordings()

@@ -1,25 +1,25 @@
-//! Excerpts of long sessions: the time that a search takes grows with what it is given, what it finds does not.
+//! Excerpts of long sessions: computing time grows with the length of the data, findings hardly do.
 
 use crate::read::recording::Recording;
 
-/// A longer session is fitted in excerpts \[s\].
+/// Length of a session above which only excerpts are fitted \[s\].
 /// Resolution: bounds the computing time.
 const LONGEST_S: f64 = 400.0;
-/// How long an excerpt is \[s\].
+/// Length of an excerpt \[s\].
 /// Physical: some strokes of a pick-and-place motion, between rests.
 const EXCERPT_S: f64 = 20.0;
 
-/// What was kept of a session.
+/// Length of a session and of its excerpts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Excerpts {
-    /// How long it is \[s\].
+    /// Length of the session \[s\].
     pub whole_s: f64,
-    /// How much of it was kept \[s\].
+    /// Total length of the excerpts \[s\].
     pub kept_s: f64,
 }
 
-/// Keeps excerpts of recordings that are longer than [`LONGEST_S`] together, spread evenly over each of them. `None` if they
-/// are not.
+/// Keeps excerpts of recordings that together are longer than [`LONGEST_S`], spread evenly over each of them. `None`
+/// if they are shorter.
 pub fn excerpts(recordings: &mut [Recording]) -> Option<Excerpts> {
     let length_s =
         |recordings: &[Recording]| recordings.iter().map(Recording::duration_s).sum::<f64>();
@@ -27,7 +27,7 @@ pub fn excerpts(recordings: &mut [Recording]) -> Option<Excerpts> {
     if whole_s <= LONGEST_S || recordings.iter().any(Recording::is_of_poses) {
         return None;
     }
-    // One of so many stretches of an excerpt's length is kept.
+    // One of `one_in` stretches of an excerpt's length is kept.
     let one_in = whole_s / LONGEST_S;
     for recording in &mut *recordings {
         let is_kept = |time_s: &f64| {
@@ -51,7 +51,7 @@ mod tests {
     use super::*;
     use crate::fixture::{model, recording};
 
-    /// Recordings of these lengths at 5 Hz \[s\].
+    /// Simulates recordings of these lengths at 5 Hz \[s\].
     fn session(lengths_s: &[usize]) -> Vec<Recording> {
         let of = |length: &usize| {
             let mut one = recording(&model(), 1, |_, _, _| {});

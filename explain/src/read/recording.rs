@@ -1,4 +1,4 @@
-//! A recording as columns: what was measured, sample by sample, in the robot's joint order.
+//! A recording as columns: the measured values, sample by sample, in the robot's joint order.
 
 mod even_clock;
 mod losses;
@@ -15,10 +15,11 @@ pub use even_clock::EvenClock;
 pub use losses::Losses;
 pub use rate::{MAX_GAP_S, mean_step_s};
 
-/// Efforts that are plain zeros at all of so many joints are no measurement. Fewer may be zero by chance, in coarse steps.
+/// Smallest number of joints for which exact zeros at all of them are not a measurement. Fewer joints may be at zero
+/// by chance, with coarse quantisation.
 /// Physical: of three joints one bears weight.
 const LEAST_JOINTS: usize = 3;
-/// Fewer rows of plain zeros are no other publisher, and harm no fit.
+/// Smallest number of rows of exact zeros that is attributed to another publisher. Fewer do not affect a fit.
 /// Resolution: a tenth of a second at 100 Hz.
 const LEAST_ROWS: usize = 10;
 
@@ -27,7 +28,7 @@ const LEAST_ROWS: usize = 10;
 pub struct Recording {
     /// The file's stem.
     pub name: String,
-    /// Where it lies.
+    /// Path of the file or folder.
     pub path: PathBuf,
     /// Stamp of its first sample \[ns since the epoch\].
     pub start_ns: i64,
@@ -39,13 +40,13 @@ pub struct Recording {
     pub velocity: Vec<f64>,
     /// Effort in the recording's unit; empty where there is none.
     pub effort: Vec<f64>,
-    /// Another twin's effort at the same instants, in the recording's unit; empty where there is none.
+    /// Effort of the external twin at the same instants, in the recording's unit; empty where there is none.
     pub reference: Vec<f64>,
-    /// For each recorded row, the sample that stands for it: repeated rows share one, and rows that are lost have none.
+    /// Sample that represents each recorded row: repeated rows share one, and lost rows have none.
     pub sample_of_row: Vec<Option<usize>>,
-    /// The drive's clock, where the stamps were put back on it.
+    /// The drive's clock, if the samples were placed on it.
     pub clock: Option<EvenClock>,
-    /// What was dropped on reading.
+    /// Messages and rows that were dropped on reading.
     pub losses: Losses,
     /// Findings on reading.
     pub findings: Vec<Finding>,
@@ -56,14 +57,14 @@ pub struct Recording {
 pub struct RecordingTopics {
     /// Measured joint states.
     pub state: String,
-    /// Another twin's efforts.
+    /// Efforts of the external twin.
     pub reference: Option<String>,
-    /// How much of a recording is read, from its first sample on \[s\]; infinite for all of it.
+    /// Length from the first sample that is read \[s\]; infinite for the whole recording.
     pub longest_s: f64,
 }
 
 impl Recording {
-    /// Reads a recording, joints put in the order of `joints`.
+    /// Reads a recording with its joints in the order of `joints`.
     ///
     /// # Errors
     /// If it cannot be read, lacks a joint or holds nothing usable.
@@ -75,7 +76,7 @@ impl Recording {
         let archive = tauscope_session::open(path)?;
         let look = Look::at(&archive, Some(&topics.state), joints)?;
         let mut reader = Reader::new(path, &look);
-        // What is known on opening, and what is found on the way.
+        // Damage known on opening, and damage found while reading.
         let mut damage = archive.damage().to_vec();
         let mut states = archive.joint_states(&topics.state)?;
         while reader.recording.duration_s() < topics.longest_s
@@ -124,7 +125,7 @@ impl Recording {
         self.time_s.is_empty()
     }
 
-    /// From the first sample to the last \[s\].
+    /// Returns the time from the first sample to the last \[s\].
     pub fn duration_s(&self) -> f64 {
         self.time_s.last().copied().unwrap_or(0.0)
     }
@@ -135,10 +136,10 @@ struct Reader {
     assembler: Assembler,
     plausible: Plausible,
     joint_count: usize,
-    /// By joint, whole turns that the driver has taken off.
+    /// Whole turns that the driver has removed, by joint.
     turns: Vec<Unwrap>,
     has_velocity: bool,
-    /// By sample, whether its efforts are a measurement.
+    /// Whether the efforts are a measurement, by sample.
     measured: Vec<bool>,
     has_effort: bool,
 }
@@ -161,7 +162,7 @@ impl Reader {
                 losses: Losses::default(),
                 findings: Vec::new(),
             },
-            // A fit needs time to advance, and the audit names the factor of a velocity.
+            // A fit needs increasing times, and the audit determines the scale of a velocity.
             assembler: look.assembler().refusing_set_back().keeping_velocity(),
             plausible: Plausible::new(look.joint_names(), None),
             joint_count,
@@ -221,7 +222,7 @@ impl Reader {
         let remarks = remarks.iter().cloned();
         let mut findings: Vec<Finding> = remarks.map(|remark| Finding::Format { remark }).collect();
         findings.extend(self.assembler.findings());
-        // The first look has judged velocities.
+        // The first look has already checked the velocities.
         let of_values = self.plausible.findings().into_iter();
         findings.extend(of_values.filter(|it| !matches!(it, Finding::Velocity { .. })));
         self.recording.findings = findings;

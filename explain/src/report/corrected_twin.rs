@@ -1,4 +1,4 @@
-//! The corrected twin: its terms and gains, those of the start included.
+//! The corrected twin: its terms and gains, including the initial ones.
 
 use tauscope_dynamics::terms::{Layer, Site, TermSpec};
 
@@ -8,8 +8,8 @@ use crate::physics::active::{Active, TimeKind};
 use crate::physics::{friction, torque_scale};
 
 impl Context<'_> {
-    /// Gain of each joint's bodies in the corrected twin, and its standard deviation. `fitted` are the standard deviations
-    /// of the gains that were fitted.
+    /// Returns the gain of each joint's bodies in the corrected twin, and its standard deviation. `fitted` are the
+    /// standard deviations of the fitted gains.
     pub fn final_gains(&self, found: &Fit, fitted: &[(usize, f64)]) -> (Vec<f64>, Vec<f64>) {
         let n = self.unit_nm.len();
         let start = self.input.start.as_ref();
@@ -23,8 +23,8 @@ impl Context<'_> {
         (gain, deviation)
     }
 
-    /// An effect in the format of `twin.yaml`. Of one that changes steadily, the simpler one as it is at the end of the
-    /// recordings: how it goes on is not known.
+    /// Converts an effect to the format of `twin.yaml`. An effect that changes steadily cannot be extrapolated, so it
+    /// becomes the simpler one with its value at the end of the recordings.
     fn spec(&self, active: &Active) -> TermSpec {
         let model = &self.input.model;
         let place = active.hypothesis.place;
@@ -37,7 +37,7 @@ impl Context<'_> {
         TermSpec::of(&*active.term(model), &site).at_session(self.session_end_s())
     }
 
-    /// When the last recording ends \[s from the start of the session\].
+    /// Returns the end of the last recording \[s from the start of the session\].
     fn session_end_s(&self) -> f64 {
         let recordings = self.input.fit.iter().chain(&self.input.holdout);
         let ends = recordings.map(|recording| {
@@ -47,7 +47,7 @@ impl Context<'_> {
         ends.fold(0.0, f64::max)
     }
 
-    /// The bodies of an explanation that load the gears for more than a moment.
+    /// Returns the bodies of an explanation that load the gears for more than a moment.
     pub fn bodies(&self, found: &Fit) -> Vec<TermSpec> {
         let of_bodies = |active: &&Active| {
             let hypothesis = active.hypothesis;
@@ -58,8 +58,8 @@ impl Context<'_> {
         bodies.map(|active| self.spec(active)).collect()
     }
 
-    /// The terms of the corrected twin: all but temporary effects, curves over time, and those of the joints that are `kept`
-    /// as they were.
+    /// Returns the terms of the corrected twin: all but temporary effects, curves over time, and those of the joints
+    /// in `kept`, which keep the initial twin.
     pub fn lasting_terms(&self, found: &Fit, kept: &[usize]) -> Vec<TermSpec> {
         let mut terms = self
             .input
@@ -76,7 +76,7 @@ impl Context<'_> {
                 continue;
             }
             let term = self.spec(active);
-            // With torque constants the terms of a twin are in N m, else in what was recorded.
+            // With torque constants the terms of a twin are in N m, otherwise in the recorded unit.
             let term = if self.input.torque_constants_nm_per_a.is_none() {
                 friction::in_recorded_units(&term, &self.input.model, self.unit_nm)
             } else {

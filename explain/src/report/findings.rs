@@ -1,4 +1,4 @@
-//! From the chosen explanation to findings with intervals, rivals and smallest effects that could be found.
+//! Conversion of the explanation to findings with intervals, alternatives and detection limits.
 
 mod clipping;
 mod far_out;
@@ -34,28 +34,29 @@ use sizes::{effort_rms, mismatch};
 pub use undetectable::undetectable;
 use waves::merge_waves;
 
-/// A time with a larger standard deviation than this has no interval \[s\].
+/// Standard deviation above which a time has no interval \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const VAGUE_S: f64 = 5.0;
 
-/// A finding's log-odds: without a margin, and by the logarithm of one plus its margin. Statistical: `python
-/// tests/proof/reliability.py tauscope OUT --first 20001 --cases 200 --half even --fit`, 268 findings of 100 cases.
+/// Coefficients of a finding's log-odds: intercept, and slope over the logarithm of one plus its margin. Statistical:
+/// `python tests/proof/reliability.py tauscope OUT --first 20001 --cases 200 --half even --fit`, 268 findings of 100
+/// cases.
 const CONFIDENCE: [f64; 2] = [0.55, 0.46];
 
-/// The findings of an explanation, and what belongs to them.
+/// The findings of an explanation, with alternatives, motions and notes.
 #[derive(Debug, Default)]
 pub struct Named {
-    /// The one that explains most first.
+    /// Findings, the one that explains most first.
     pub findings: Vec<Finding>,
-    /// Rivals.
+    /// Rejected alternatives.
     pub rejected: Vec<Rejected>,
-    /// Motions that would separate rivals that tie.
+    /// Motions that would distinguish equally likely alternatives.
     pub next_motions: Vec<NextMotion>,
-    /// Their files: name and text.
+    /// Files of the motions: name and text.
     pub trajectories: Vec<(String, String)>,
-    /// On the scales of drives.
+    /// Notes on the torque scales of drives.
     pub notes: Vec<String>,
-    /// Standard deviations of the gains that were fitted, by joint.
+    /// Standard deviations of the fitted gains, by joint.
     pub gain_deviation: Vec<(usize, f64)>,
 }
 
@@ -100,7 +101,7 @@ fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
     }
 }
 
-/// The findings of an inferred explanation.
+/// Returns the findings of an inferred explanation.
 pub fn of(
     problem: &Problem,
     inferred: &Inferred,
@@ -127,7 +128,7 @@ pub fn of(
         let active = &active;
         let less = fit.without(problem, &parts);
         let size = effort_rms(&less, fit, unit_nm);
-        // A mass that its bound holds at zero is no finding; a push without a known force is one.
+        // A mass at its bound of zero is not a finding; a push with an unknown force is one.
         if size == 0.0 && active.hypothesis.time_kind() == TimeKind::Always {
             continue;
         }
@@ -170,7 +171,7 @@ pub fn of(
         finding.sentence += far_out::far_out(finding, &problem.model).unwrap_or_default();
     }
     merge_waves(&mut named.findings);
-    // The errors of such bodies look like these effects.
+    // The errors of implausible bodies look like these effects.
     if fit.actives.iter().any(|a| imitates(a.hypothesis.effect)) {
         named.notes.extend(oddities(&input.model));
     }
@@ -180,13 +181,13 @@ pub fn of(
     named
 }
 
-/// Confidence of a finding by its margin \[nats\]: what the explanation loses without it.
+/// Returns the confidence of a finding from its margin: the loss of evidence without it \[nats\].
 fn confidence_of(margin: f64) -> f64 {
     let [base, slope] = CONFIDENCE;
     1.0 / (1.0 + (-base - slope * margin.max(0.0).ln_1p()).exp())
 }
 
-/// The numbers of an effect by name, and their 95 % intervals.
+/// Returns the parameters of an effect by name, and their 95 % intervals.
 fn numbers(
     problem: &Problem,
     fit: &Fit,
@@ -200,7 +201,7 @@ fn numbers(
     let all = effect.parameters.iter().zip(&values);
     for ((parameter, value), deviation) in all.zip(deviations) {
         parameters.insert(parameter.name.to_owned(), number(*value));
-        // The time of a change between two recordings is not known any better.
+        // The time of a change between two recordings is not determined more precisely.
         let vague = parameter.name.starts_with("change_time") && *deviation > VAGUE_S;
         if deviation.is_finite() && !vague {
             let half = HALF_WIDTH_95 * deviation;
@@ -223,7 +224,7 @@ fn numbers(
     (parameters, intervals)
 }
 
-/// What a curve is a function of, and where it is largest.
+/// Adds the argument of a curve, and its largest value with its place.
 fn describe_curve(active: &Active, parameters: &mut BTreeMap<String, Value>) {
     let Some(curve) = &active.curve else {
         return;
@@ -239,12 +240,13 @@ fn describe_curve(active: &Active, parameters: &mut BTreeMap<String, Value>) {
     }
 }
 
-/// A force at a link's frame counts as zero if each component is weaker than this \[N\].
+/// Force component below which a push at a link's frame is treated as zero \[N\].
 /// Resolution: far below any force that an arm feels.
 const LEAST_FORCE_N: f64 = 0.01;
 
-/// Removes the force of a push where it is zero, and the intervals of its times, which depend on it. The force is zero if
-/// the link's frame lies on the axes of all joints that the push loads: no force at the frame loads them.
+/// Removes the force of a push where it is zero, and the intervals of its times, which depend on it. The force is
+/// zero if the link's frame is on the axes of all joints that the push loads: then a force at the frame causes no
+/// joint torque.
 fn drop_no_force(
     parameters: &mut BTreeMap<String, Value>,
     intervals: &mut BTreeMap<String, [f64; 2]>,
@@ -272,7 +274,8 @@ struct When {
     end: Option<f64>,
 }
 
-/// The times of a finding. Where they hold for one recording, its parameters are changed to that recording's time.
+/// Returns the times of a finding. If they hold for one recording, its parameters are converted to that recording's
+/// time.
 fn when(
     problem: &Problem,
     active: &Active,
@@ -297,7 +300,7 @@ fn when(
                 return none;
             };
             if active.hypothesis.effect.traits.in_session {
-                // An end that is none has no interval.
+                // An end outside the session has no interval.
                 let (first_s, last_s) = problem.session_s();
                 let within = |t: f64| t.clamp(first_s, last_s);
                 for (name, t) in [("t_start_s", start), ("t_end_s", end)] {

@@ -11,36 +11,37 @@ use crate::physics::carrier::is_on_carrier;
 use crate::read::recording::Recording;
 use crate::report::schema::{JointPicture, RecordingPicture};
 
-/// Cutoffs that are tried for the motion of a prediction, as shares of the fit's cutoff. The best on the fitted
-/// recordings is used.
+/// Cutoffs of the motion of a prediction in the grid, relative to the fit's cutoff. The best on the fitted recordings
+/// is used.
 /// Resolution: steps of about 1.4; the fitted recordings decide.
 const PREDICTION_CUTOFFS: [f64; 5] = [0.75, 1.0, 1.4, 2.0, 3.0];
-/// Cutoffs that are tried for the velocity of friction, as multiples of the motion's cutoff. The recorded velocity is
-/// tried, too: friction depends on the sign of velocities of a few mrad/s.
+/// Cutoffs of the velocity of friction in the grid, relative to the motion's cutoff. The recorded velocity is tried,
+/// too: friction depends on the sign of velocities of a few mrad/s.
 /// Resolution: octaves; the fitted recordings decide.
 const VELOCITY_CUTOFFS: [f64; 3] = [2.0, 4.0, 8.0];
-/// Highest cutoff of the velocity, as a share of the sample rate.
+/// Highest cutoff of the velocity, relative to the sample rate.
 /// Physical: below half the sample rate, the Nyquist frequency.
 const MOST_OF_RATE: f64 = 0.4;
-/// Most samples of a picture.
+/// Largest number of samples of a plot.
 /// Resolution: about two per pixel of a plot; changes the file's size.
 const PICTURE_SAMPLES: usize = 2000;
 
-/// Errors on the held-out recordings, predictions and pictures.
+/// Errors on the held-out recordings, predictions and plots.
 pub struct Proof {
-    /// RMS error of the twin as it was, by joint \[effort unit\].
+    /// RMS error of the initial twin, by joint \[effort unit\].
     pub before: Vec<f64>,
-    /// The same of the corrected twin.
+    /// RMS error of the corrected twin, by joint \[effort unit\].
     pub after: Vec<f64>,
-    /// Joints that keep the twin as it was, because their correction predicts no recording that it was not fitted on.
+    /// Joints that keep the initial twin, because their correction does not predict recordings that were left out of
+    /// the fit.
     pub kept: Vec<usize>,
-    /// The corrected twin's effort by hold-out recording; NaN in rows that were lost on reading.
+    /// The corrected twin's effort by held-out recording; NaN in rows that were lost on reading.
     pub predictions: Vec<(String, Vec<f64>)>,
-    /// The series of the pictures, held-out recordings first.
+    /// Series of the plots, held-out recordings first.
     pub pictures: Vec<RecordingPicture>,
 }
 
-/// How the motion of a prediction is smoothed.
+/// Smoothing of the motion of a prediction.
 #[derive(Debug, Clone, Copy)]
 struct Smoothing {
     motion_hz: f64,
@@ -51,13 +52,13 @@ struct Smoothing {
 #[derive(Debug, Clone, Copy)]
 enum Velocity {
     AsMotion,
-    /// Half amplitude at \[Hz\].
+    /// Smoothed positions, with half amplitude at this frequency \[Hz\].
     Smoothed(f64),
     Recorded,
 }
 
 impl Context<'_> {
-    /// The corrected twin's effort over a track, in the recording's unit.
+    /// Computes the corrected twin's effort over a track, in the recording's unit.
     pub fn predict(&self, problem: &Problem, fit: &Fit, track: &Track) -> Vec<f64> {
         let carrier = fit.parts.carrier.as_deref();
         let robot = |active: &Active| carrier.filter(|_| is_on_carrier(active));
@@ -75,8 +76,8 @@ impl Context<'_> {
         effort
     }
 
-    /// Negative log-likelihood per sample of the fitted recordings' unfiltered effort with this smoothing, up to factor and
-    /// constant.
+    /// Returns the negative log-likelihood per sample of the fitted recordings' unfiltered effort with this
+    /// smoothing, up to factor and constant.
     fn unlikeliness(
         &self,
         problem: &Problem,
@@ -110,7 +111,7 @@ impl Context<'_> {
         Ok(track)
     }
 
-    /// The smoothing that predicts the fitted recordings' unfiltered effort best.
+    /// Returns the smoothing with the best prediction of the fitted recordings' unfiltered effort.
     fn best_smoothing(&self, problem: &Problem, found: &Fit) -> Result<Smoothing, TermError> {
         let start = Smoothing {
             motion_hz: Problem::motion_cutoff_hz(problem.cutoff_hz),
@@ -153,7 +154,8 @@ impl Context<'_> {
         Ok(best.1)
     }
 
-    /// RMS error by joint of the twin as it is on the hold-out recordings \[effort unit\]; NaN where no effort was recorded.
+    /// Returns the RMS error by joint of the initial twin on the held-out recordings \[effort unit\]; NaN where no
+    /// effort was recorded.
     ///
     /// # Errors
     /// If a term of the start cannot be built for the robot.
@@ -170,7 +172,7 @@ impl Context<'_> {
         Ok(errors.rms())
     }
 
-    /// Runs the corrected twin over the hold-out recordings; the joints `kept` have the twin as it was.
+    /// Runs the corrected twin over the held-out recordings; the joints `kept` have the initial twin.
     pub fn proof(
         &self,
         problem: &Problem,
@@ -236,7 +238,7 @@ impl Errors {
         }
     }
 
-    /// Adds those of a recording.
+    /// Adds the errors of a recording.
     fn add(&mut self, recording: &Recording, twin: &[f64]) {
         let n = self.squares.len();
         let rows = recording.effort.chunks_exact(n).zip(twin.chunks_exact(n));
@@ -248,7 +250,7 @@ impl Errors {
         }
     }
 
-    /// RMS error by joint; NaN where no effort was recorded.
+    /// Returns the RMS error by joint; NaN where no effort was recorded.
     fn rms(&self) -> Vec<f64> {
         let each = self.squares.iter();
         each.map(|square| (square / self.count).sqrt()).collect()

@@ -1,25 +1,26 @@
-//! Where the mismatch is, without a hypothesis: by joint, by state, by time.
+//! Location of the mismatch without a hypothesis: by joint, by state, by time.
 
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::report::schema::Located;
 
-/// Rows are sorted by position, speed, acceleration or load into this many parts with equally many rows, and recordings
-/// cut into as many parts of equal length.
-/// Resolution: of words as slow and fast.
+/// Number of parts with equally many rows in position, speed, acceleration or load, and of parts of equal length in a
+/// recording.
+/// Resolution: that of words such as slow and fast.
 const PARTS: i32 = 5;
-/// How many states of a joint are listed.
+/// Number of listed states of a joint.
 /// Resolution: the page shows the first few.
 const MOST_STATES: usize = 3;
 
-/// Whether the mean of `count` squares is larger than `usual` by more than chance: by three standard deviations of that mean,
-/// if they are of a normal variable.
+/// Whether the mean of `count` squares exceeds `usual` significantly: by three standard deviations of the mean of a
+/// normal variable's squares.
 fn stands_out(mean: f64, usual: f64, count: usize) -> bool {
     let spread = (2.0 / count.max(1) as f64).sqrt();
     mean > usual * (1.0 + 3.0 * spread)
 }
 
-/// The mismatch of each joint over all states, followed by the states in which it is concentrated; the largest first.
+/// Returns the mismatch of each joint over all states, followed by the states in which it is concentrated; the
+/// largest first.
 pub fn located(problem: &Problem, before: &Fit, joints: &[String]) -> Vec<Located> {
     let mut all = Vec::new();
     for (j, name) in joints.iter().enumerate() {
@@ -45,7 +46,7 @@ pub fn located(problem: &Problem, before: &Fit, joints: &[String]) -> Vec<Locate
         .collect()
 }
 
-/// The compared rows of a joint.
+/// Returns the compared rows of a joint.
 fn rows_of(problem: &Problem, before: &Fit, joint: usize) -> Vec<Row> {
     let rows = problem.joint_rows(joint);
     let mut all = Vec::new();
@@ -68,7 +69,7 @@ fn rows_of(problem: &Problem, before: &Fit, joint: usize) -> Vec<Row> {
     all
 }
 
-/// The states of a joint in which its mismatch is concentrated: the [`MOST_STATES`] with the largest RMS.
+/// Returns the states of a joint in which its mismatch is concentrated: the [`MOST_STATES`] with the largest RMS.
 fn concentrated(problem: &Problem, rows: &[Row], name: &str, noise: f64) -> Vec<Located> {
     let total: f64 = rows.iter().map(|s| s.square).sum();
     let mean = total / rows.len().max(1) as f64;

@@ -1,4 +1,4 @@
-//! The part that a mechanic looks at for a finding.
+//! The part to inspect for a finding.
 
 use serde_json::Value;
 use tauscope_dynamics::terms::{Against, UNKNOWN, effect, words};
@@ -6,7 +6,7 @@ use tauscope_dynamics::terms::{Against, UNKNOWN, effect, words};
 use crate::report::schema::Finding;
 use crate::report::slip_words;
 
-/// What to look at for a finding; nothing where it is no fault.
+/// Returns the part to inspect for a finding; `None` if it is not a fault.
 pub fn look_at(finding: &Finding) -> Option<String> {
     let known = finding.known_as();
     let is_curve = known == UNKNOWN.name && finding.link.is_none();
@@ -24,7 +24,7 @@ pub fn look_at(finding: &Finding) -> Option<String> {
     }))
 }
 
-/// The likely part where something has no name, by what it depends on.
+/// Returns the likely part of an unnamed effect by the argument of its curve.
 fn of_curve(finding: &Finding) -> Option<&'static str> {
     let against = finding.parameters.get("against")?.clone();
     let against = serde_json::from_value::<Against>(against).ok()?;

@@ -1,4 +1,4 @@
-//! The motion that would separate effects that this data cannot tell apart: as text, and as a trajectory within the URDF's
+//! The motion that would distinguish effects that this data does not: as text, and as a trajectory within the URDF's
 //! limits.
 
 use std::f64::consts::TAU;
@@ -11,7 +11,7 @@ use crate::physics::active::Hypothesis;
 use crate::read::input::Input;
 use crate::report::schema::{NextMotion, Rival};
 
-/// How the name of a file with a motion to record next begins.
+/// File name prefix of a motion to record next.
 pub const MOTION_PREFIX: &str = "next_";
 
 /// Share of a joint's range, and of its speed limit, that a trajectory uses.
@@ -26,41 +26,41 @@ const DEFAULT_SPEED: f64 = 1.0;
 /// Highest acceleration \[rad/s² or m/s²\].
 /// Physical: URDFs give none, and collaborative arms reach it.
 const ACCELERATION: f64 = 4.0;
-/// How long a part of a trajectory lasts \[s\].
+/// Duration of a part of a trajectory \[s\].
 /// Resolution: two periods of its slowest wave.
 const PART_S: f64 = 20.0;
 /// Time between two rows of a trajectory \[s\].
 /// Resolution: 100 rows per second; changes the file's size.
 const STEP_S: f64 = 0.01;
-/// The slowest speed of a creeping joint \[rad/s or m/s\].
-/// Physical: twice what counts as standstill, and well below usual Stribeck velocities.
+/// Slowest speed of a creeping joint \[rad/s or m/s\].
+/// Physical: twice the limit of standstill, and well below typical Stribeck velocities.
 const CREEP: f64 = 0.02;
 /// Number of speeds of a creeping joint, and ratio of each to the one before.
 /// Resolution: evenly by logarithm from creeping to half a rad/s.
 const SPEEDS: usize = 5;
 const FASTER: f64 = 2.2;
-/// How long a creeping joint takes to reach its speed, and to stop \[s\].
+/// Duration of the ramps to the speed of a creeping joint and back to zero \[s\].
 /// Physical: at the highest of these speeds, less than [`ACCELERATION`].
 const RAMP_S: f64 = 0.3;
-/// How long the other motions take to fade in, and to fade out \[s\].
+/// Duration of the fade-in and the fade-out of the other motions \[s\].
 /// Resolution: a tenth of a part.
 const FADE_S: f64 = 2.0;
-/// Harmonics of a wave.
-/// Resolution: as in Swevers et al., "Optimal Robot Excitation and Identification", *IEEE Transactions on Robotics and
-/// Automation* 13, 1997.
+/// Number of harmonics of a wave.
+/// Resolution: as in Swevers et al., "Optimal Robot Excitation and Identification", *IEEE Transactions on Robotics
+/// and Automation* 13, 1997.
 const HARMONICS: u32 = 5;
-/// Angle between the phases of two harmonics, which keeps joints and harmonics out of step \[rad\].
+/// Phase difference between two harmonics, which keeps joints and harmonics out of phase \[rad\].
 /// Resolution: the golden angle.
 const PHASE: f64 = 2.4;
 
-/// What a motion must excite.
+/// The excitation that a motion must have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Excite {
     /// The whole range of one joint, slowly: springs and other functions of position.
     WholeRange,
     /// Fast reversals: delays and rotors.
     Fast,
-    /// One joint at constant speeds from creeping on, in both directions: kinds of friction near standstill.
+    /// One joint at constant speeds, the slowest first, in both directions: kinds of friction near standstill.
     Creep,
     /// Every speed in both directions, with reversals: kinds of friction.
     AllSpeeds,
@@ -69,7 +69,7 @@ enum Excite {
 }
 
 impl Excite {
-    /// The motions that tell two effects apart.
+    /// Returns the motions that distinguish two effects.
     fn of(winner: &Effect, rival: &Effect) -> &'static [Self] {
         match winner.excitation.between(rival.excitation) {
             Excitation::Fast => &[Self::Fast],
@@ -79,7 +79,7 @@ impl Excite {
         }
     }
 
-    /// The motions that tell `winner` from each of its rivals.
+    /// Returns the motions that distinguish `winner` from each of its alternatives.
     fn of_class(winner: &Hypothesis, ties: &[Hypothesis]) -> Vec<Self> {
         let mut parts = Vec::new();
         for rival in ties {
@@ -117,7 +117,7 @@ impl Excite {
     }
 }
 
-/// The motion to record next for a finding with rivals that tie, and its trajectory as CSV text.
+/// Returns the motion to record next for a finding with equally likely alternatives, and its trajectory as CSV text.
 pub fn of(
     winner: &Hypothesis,
     ties: &[Hypothesis],
@@ -148,7 +148,7 @@ pub fn of(
     Some((motion, csv(&input.model, &parts, joint, &centre)))
 }
 
-/// The middle of each joint's recorded range, which is known to be free of obstacles.
+/// Returns the middle of each joint's recorded range, which is known to be free of obstacles.
 fn centre_of(input: &Input) -> Vec<f64> {
     let n = input.model.dof();
     (0..n)
@@ -163,7 +163,7 @@ fn centre_of(input: &Input) -> Vec<f64> {
         .collect()
 }
 
-/// Header `t,` and the joints' names; positions \[rad or m\], one part after the other.
+/// Writes the trajectory: the header `t,` and the joints' names; positions \[rad or m\], one part after the other.
 fn csv(model: &Model, parts: &[Excite], joint: usize, centre: &[f64]) -> String {
     let mut text = String::from("t");
     for name in model.joint_names() {
@@ -186,8 +186,8 @@ fn csv(model: &Model, parts: &[Excite], joint: usize, centre: &[f64]) -> String 
     text
 }
 
-/// Distance at time `t` from the start of a joint that creeps there and back at one speed after the other. Each speed is
-/// limited so that the joint stays within `room`.
+/// Returns the distance at time `t` from the start of a joint that creeps there and back at one speed after the
+/// other. Each speed is limited so that the joint stays within `room`.
 fn crept(room: f64, speed: f64, t: f64) -> f64 {
     let stroke_s = PART_S / (2 * SPEEDS) as f64;
     let stroke = (t / stroke_s) as i32;
@@ -207,7 +207,7 @@ fn crept(room: f64, speed: f64, t: f64) -> f64 {
     }
 }
 
-/// Position of joint `j` at time `t` of a motion about `centre`, within the limits, from rest to rest.
+/// Returns the position of joint `j` at time `t` of a motion about `centre`, within the limits, from rest to rest.
 fn position(model: &Model, excite: Excite, joint: usize, centre: &[f64], j: usize, t: f64) -> f64 {
     let limits = &model.joints()[j].limits;
     let (lower, upper) = match (limits.lower, limits.upper) {
@@ -237,8 +237,8 @@ fn position(model: &Model, excite: Excite, joint: usize, centre: &[f64], j: usiz
     middle + fade * wave(base_hz, j, [room, speed, ACCELERATION], t)
 }
 
-/// A finite Fourier series whose harmonics have one amplitude of velocity, as large as these limits of position, velocity
-/// and acceleration allow (Swevers et al., 1997).
+/// Evaluates a finite Fourier series whose harmonics have equal velocity amplitudes, as large as these limits of
+/// position, velocity and acceleration allow (Swevers et al., 1997).
 fn wave(base_hz: f64, joint: usize, [position, velocity, acceleration]: [f64; 3], t: f64) -> f64 {
     let omega = TAU * base_hz;
     let all = || (1..=HARMONICS).map(f64::from);

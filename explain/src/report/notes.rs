@@ -1,4 +1,4 @@
-//! Notes of the report beside the findings.
+//! Notes of the report in addition to the findings.
 
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
@@ -12,34 +12,34 @@ use crate::report::sentences::{UNCHANGED, unit_at};
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::words::number;
 
-/// A residual above this many times the white noise gets a note.
+/// Smallest residual with a note, in standard deviations of the white noise.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LOUD: f64 = 5.0;
 
-/// Lateness of another simulation that is worth a note \[s\].
+/// Smallest delay of the external twin with a note \[s\].
 /// Resolution: half a sample at 500 Hz.
 const LATE_S: f64 = 0.001;
 
-/// The note on another simulation whose effort is late.
+/// Returns the note on the delay of an external twin.
 pub fn late_twin(late_s: f64) -> Option<String> {
     (late_s > LATE_S).then(|| {
         let late_ms = number(1e3 * late_s);
         format!(
-            "The effort of the twin's topic is {late_ms} ms late. So it was compared with the effort that was measured {late_ms} ms \
-             before its stamp. Detectors that use the topic as it is see the lateness."
+            "The effort of the twin's topic is {late_ms} ms late. Therefore it was compared with the effort that was measured {late_ms} ms \
+             before its stamp. Detectors that use the topic directly see the delay."
         )
     })
 }
 
-/// Notes on the joints whose correction is not handed out, or makes the error on the held-out recordings larger.
+/// Returns notes on the joints whose correction is withheld, or increases the error on the held-out recordings.
 pub fn not_handed_out(proof: &Proof, found: &Fit, model: &Model, unit: &str) -> Vec<String> {
     let mut notes = Vec::new();
     for (joint, of_joint) in model.joints().iter().enumerate() {
         let (name, unit) = (&of_joint.name, unit_at(unit, of_joint));
         if proof.kept.contains(&joint) {
             notes.push(format!(
-                "The correction of joint {name} does not predict fitted recordings that were left out. So twin.yaml and the \
-                 predictions keep the twin as it was at this joint."
+                "The correction of joint {name} does not predict fitted recordings that were left out. Therefore twin.yaml and the \
+                 predictions keep the initial twin at this joint."
             ));
         }
         let (before, after) = (proof.before[joint], proof.after[joint]);
@@ -55,32 +55,32 @@ pub fn not_handed_out(proof: &Proof, found: &Fit, model: &Model, unit: &str) -> 
     notes
 }
 
-/// That the only recording was parted.
+/// Returns the note that the only recording was split.
 pub fn is_parted() -> String {
     "There is one recording: its last quarter was held out. A second recording with another motion is the better test.".to_owned()
 }
 
-/// That a long session was fitted in excerpts.
+/// Returns the note that a long session was fitted in excerpts.
 pub fn in_excerpts(excerpts: Excerpts) -> String {
     let Excerpts { whole_s, kept_s } = excerpts;
     format!(
-        "The fitted recordings last {whole_s:.0} s together. Excerpts of {kept_s:.0} s were fitted, spread evenly over them. What \
-         acted for a moment in between was not looked for: explain fewer recordings to find it."
+        "The fitted recordings last {whole_s:.0} s together. Excerpts of {kept_s:.0} s were fitted, spread evenly over them. \
+         Temporary effects between them were not searched for: explain fewer recordings to find these."
     )
 }
 
-/// Notes on the curves over time: another run begins at another time of whatever they follow.
+/// Returns notes on the curves over time, which another run does not repeat.
 fn over_time(found: &Fit, model: &Model) -> impl Iterator<Item = String> {
     let curves = (found.actives.iter()).filter(|active| active.is_curve_over_time());
     curves.map(|active| {
         format!(
-            "The curve of joint {} over time is not in twin.yaml: how it goes on is not known.",
+            "The curve of joint {} over time is not in twin.yaml, because it cannot be extrapolated.",
             model.joints()[active.hypothesis.place.joint].name
         )
     })
 }
 
-/// The notes on an input and on the fit `found`.
+/// Returns the notes on an input and on the fit `found`.
 pub fn notes(
     input: &Input,
     problem: &Problem,
@@ -104,15 +104,15 @@ pub fn notes(
     }
     if of_poses {
         notes.push(
-            "The samples are too far apart to tell a motion, so they were compared as poses that the arm holds. That shows gravity, \
-             loads, springs, offsets and gains. It shows no friction, rotor, elasticity or delay: record motions for these."
+            "The samples are too far apart to determine a motion, so they were compared as held poses. Poses show gravity, \
+             loads, springs, offsets and gains, but no friction, rotor, elasticity or delay: record motions for these."
                 .to_owned(),
         );
     }
     if !at_rest && !of_poses {
         notes.push(
             "While a joint stands still, its friction can have any value up to the breakaway torque. Such rows were not used for \
-             the fit; they do count in the error on the held-out recordings."
+             the fit; they are included in the error on the held-out recordings."
                 .to_owned(),
         );
     }

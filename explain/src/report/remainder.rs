@@ -8,8 +8,8 @@ use crate::inference::remainder::Predicted;
 use crate::report::schema::Remaining;
 use crate::report::sentences::unit_at;
 
-/// The remainders of a fit with a sentence each. `noise` is the white noise of each joint \[effort unit\], `unit_nm` are N m
-/// per effort unit, by joint.
+/// Returns the remaining residuals of a fit with a sentence each. `noise` is the white noise of each joint
+/// \[effort unit\], `unit_nm` are N m per effort unit, by joint.
 pub fn remaining(
     model: &Model,
     fit: &Fit,

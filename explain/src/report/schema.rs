@@ -16,45 +16,46 @@ pub struct Report {
     pub case: String,
     /// The verdict.
     pub verdict: Verdict,
-    /// Why nothing was evaluated, if so.
+    /// The reason why nothing was evaluated, if so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     /// The verdict in a sentence.
     pub summary: String,
     /// Unit of the recordings' effort: `Nm` or `A`.
     pub effort_unit: String,
-    /// The effects that the twin leaves out. The one that explains most comes first.
+    /// The effects that the twin lacks. The one that explains most comes first.
     pub findings: Vec<Finding>,
     /// Hypotheses that were rejected, with the reason.
     pub rejected: Vec<Rejected>,
-    /// Where the mismatch is, without a hypothesis; the largest first.
+    /// Location of the mismatch, without a hypothesis; the largest first.
     pub located: Vec<Located>,
-    /// The smallest effects that would have been found. Smaller ones may be present.
+    /// Detection limits of the effects. Smaller effects may be present.
     pub undetectable: Vec<Undetectable>,
-    /// Motions that would tell apart what this data cannot.
+    /// Motions that would distinguish effects that this data does not.
     pub next_motions: Vec<NextMotion>,
-    /// What the corrected twin leaves beyond the noise, by joint.
+    /// Remaining residual of the corrected twin beyond the noise, by joint.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub remaining: Vec<Remaining>,
     /// Notes: lost samples, gains that are not identifiable, standstill.
     pub notes: Vec<String>,
     /// The joints, in URDF order.
     pub joints: Vec<String>,
-    /// Those of them that slide: their efforts are in N where those of the others are in N m.
+    /// Prismatic joints: their efforts are in N where those of the others are in N m.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sliding_joints: Vec<String>,
-    /// RMS of measured effort minus the twin's over all hold-out samples, unfiltered, by joint \[effort unit\].
+    /// RMS of measured effort minus the twin's over all held-out samples, unfiltered, by joint \[effort unit\].
     pub holdout_rms_before: Vec<f64>,
-    /// The same of the corrected twin.
+    /// RMS of measured effort minus the corrected twin's over the same samples, by joint \[effort unit\].
     pub holdout_rms_after: Vec<f64>,
-    /// White noise of the measured effort, by joint \[effort unit\], estimated from its fastest changes on the fitted recordings.
+    /// White noise of the measured effort, by joint \[effort unit\], estimated from its fastest changes on the fitted
+    /// recordings.
     pub noise_floor: Vec<f64>,
-    /// By hold-out recording, the file with the corrected twin's effort.
+    /// File with the corrected twin's effort, by held-out recording.
     pub holdout_predictions: BTreeMap<String, String>,
 }
 
 impl Report {
-    /// The unit of the recordings' effort in text: at a joint, or at most of them.
+    /// Returns the unit of the recordings' effort in text: at a joint, or at most of them.
     pub fn effort_unit_at(&self, joint: Option<&str>) -> &str {
         let slides = |joint| self.sliding_joints.iter().any(|other| other == joint);
         match (self.effort_unit.as_str(), joint.is_some_and(slides)) {
@@ -64,15 +65,15 @@ impl Report {
         }
     }
 
-    /// Whether all but the faults that are listed first is of the recordings without these faults.
+    /// Whether the recordings have faults, so that all other content is that of the corrected recordings.
     pub fn is_of_mended(&self) -> bool {
         self.findings.iter().any(Finding::is_slip)
     }
 
-    /// The motions to record next, a sentence and its motions each; a motion that is the same for several joints has one
+    /// Returns the motions to record next, grouped by sentence; a motion that is the same for several joints has one
     /// sentence.
     pub fn grouped_motions(&self) -> Vec<(String, Vec<&NextMotion>)> {
-        // Stands for the joint in a sentence.
+        // Placeholder of the joint in a sentence.
         const ITS: &str = "joint \0 ";
         let joint_of = |motion: &NextMotion| {
             let first = motion.separates.first();
@@ -108,13 +109,14 @@ impl Report {
         in_words.collect()
     }
 
-    /// Whether there is a corrected twin for a pipeline. One of mended recordings would not fit what the robot publishes.
+    /// Whether a corrected twin is written for a pipeline. That of corrected recordings would not match what the
+    /// robot publishes.
     pub fn hands_out_twin(&self) -> bool {
         self.verdict != Verdict::NotEvaluated && self.mended().next().is_none()
     }
 
-    /// The faults of the recordings that were mended and that a pipeline would meet again. It does not use a velocity that
-    /// is not the derivative of the position, and leaves efforts out that drop to zero.
+    /// Returns the corrected faults of the recordings that also affect a pipeline. A pipeline does not use a velocity
+    /// that is not the derivative of the position, and it excludes efforts that drop to zero.
     pub fn mended(&self) -> impl Iterator<Item = &Finding> {
         self.findings.iter().filter(|finding| {
             finding.is_slip() && !finding.is_of_velocity() && finding.known_as() != "effort_dropout"
@@ -122,98 +124,98 @@ impl Report {
     }
 }
 
-/// The answer of an explanation in one word.
+/// The verdict of an explanation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// All mismatch has named causes.
     Explained,
-    /// The twin is right as it is.
+    /// The twin needs no correction.
     NothingMissing,
-    /// Some mismatch is explained by no effect of the library.
+    /// No effect of the library explains part of the mismatch.
     UnknownRemains,
     /// The data does not allow a verdict.
     NotEvaluated,
 }
 
-/// What the corrected twin leaves at a joint beyond the noise. Efforts are compared below the cutoff of the fit, without the
-/// joint's standstills.
+/// The remaining residual of the corrected twin at a joint beyond the noise. Efforts are compared below the cutoff of
+/// the fit, without the joint's standstills.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Remaining {
     /// The joint.
     pub joint: String,
     /// RMS on the fitted recordings \[effort unit\].
     pub rms: f64,
-    /// RMS on the held-out ones \[effort unit\].
+    /// RMS on the held-out recordings \[effort unit\].
     pub holdout_rms: Option<f64>,
-    /// The measurement's white noise there \[effort unit\].
+    /// White noise of the measurement there \[effort unit\].
     pub noise: f64,
-    /// What it goes with, when and where.
+    /// A sentence with the quantity on which it depends, and where.
     pub sentence: String,
 }
 
 impl Remaining {
-    /// RMS on the fitted or the held-out recordings, where it is larger \[effort unit\].
+    /// Returns the larger RMS of the fitted and the held-out recordings \[effort unit\].
     pub fn largest_rms(&self) -> f64 {
         self.rms.max(self.holdout_rms.unwrap_or(0.0))
     }
 
-    /// The same in units of the measurement's white noise.
+    /// Returns the larger RMS in units of the measurement's white noise.
     pub fn over_noise(&self) -> f64 {
         self.largest_rms() / self.noise.max(f64::MIN_POSITIVE)
     }
 }
 
-/// The `kind` of an `unknown` that says only where something remains.
+/// The `kind` of an `unknown` that gives only the place of a remaining residual.
 pub const WITHOUT_LAW: &str = "without_law";
-/// The parameter of an absent tool that is its share of what the twin has there.
+/// Parameter of an absent tool: its share of the body that the twin has there.
 pub const SHARE_OF_CARRIED: &str = "share_of_carried";
 
-/// An effect that the twin leaves out.
+/// An effect that the twin lacks.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Finding {
     /// Canonical name.
     pub effect: String,
-    /// The joint it is in, for effects of a joint.
+    /// The joint, for effects of a joint.
     pub joint: Option<String>,
-    /// The link it is in, for effects of a link.
+    /// The link, for effects of a link.
     pub link: Option<String>,
-    /// Numbers (and names, e.g. `source_joint`) by canonical name.
+    /// Parameters by canonical name: numbers, and names such as `source_joint`.
     pub parameters: BTreeMap<String, Value>,
-    /// 95 % intervals of the numbers.
+    /// 95 % intervals of the numeric parameters.
     pub intervals_95: BTreeMap<String, [f64; 2]>,
-    /// Whether its efforts are in A, although the names of its parameters say N m: the torque scale of its joint is not
-    /// known.
+    /// Whether its efforts are in A, although the names of its parameters say N m, because the torque scale of its
+    /// joint is unknown.
     #[serde(default, skip_serializing_if = "is_false")]
     pub in_amperes: bool,
-    /// Whether its joint slides: its numbers are in N and m, although the names of its parameters say N m and rad.
+    /// Whether its joint is prismatic: its parameters are in N and m, although their names say N m and rad.
     #[serde(default, skip_serializing_if = "is_false")]
     pub slides: bool,
-    /// Probability that effect and place are right, up to what no recording can tell apart.
+    /// Probability that effect and place are right, except for alternatives that no recording can distinguish.
     pub confidence: f64,
     /// The recording that the times refer to. If absent: each recording or, for a lasting change, the session.
     pub recording: Option<String>,
-    /// When it begins \[s\].
+    /// Time at which it begins \[s\].
     pub t_start: Option<f64>,
-    /// When it ends \[s\].
+    /// Time at which it ends \[s\].
     pub t_end: Option<f64>,
-    /// Share of the mismatch's variance that it explains, over all joints in units of their noise.
+    /// Share of the variance of the mismatch that it explains, over all joints in units of their noise.
     pub explains: f64,
-    /// Logarithm of the odds of the explanation with it against the best one without it \[nats\].
+    /// Log-odds of the explanation with it against the best one without it \[nats\].
     #[serde(default)]
     pub evidence_nats: f64,
-    /// How much effort it is: what is left without it less what is left with it, as root mean square at the joint where
-    /// that is most \[effort unit\].
+    /// RMS of its effort: the residual without it minus the residual with it, at the joint with the largest
+    /// difference \[effort unit\].
     #[serde(default)]
     pub effort_rms: f64,
-    /// Rivals that this data cannot tell apart, most probable first.
+    /// Alternatives that this data does not distinguish, most probable first.
     pub equivalent_to: Vec<Rival>,
     /// The finding as a sentence.
     pub sentence: String,
 }
 
 impl Finding {
-    /// The effect, by the name that [`tauscope_dynamics::terms`] knows it by: that of an `unknown` with a law is its `kind`.
+    /// Returns the effect by its name in [`tauscope_dynamics::terms`]: for an `unknown` with a law, its `kind`.
     pub fn known_as(&self) -> &str {
         let kind = self.parameters.get("kind").and_then(Value::as_str);
         let is_law = |kind: &str| effect(kind).is_some_and(|e| e.said() == self.effect);
@@ -221,12 +223,12 @@ impl Finding {
             .unwrap_or(&self.effect)
     }
 
-    /// Whether it says only that something remains at its joint: the correction has nothing for it.
+    /// Whether it only reports a remaining residual at its joint, without a correction.
     pub fn is_without_law(&self) -> bool {
         self.parameters.get("kind").and_then(Value::as_str) == Some(WITHOUT_LAW)
     }
 
-    /// Whether it is a body that is off by as much as those of a URDF are.
+    /// Whether it is an error of a body within the usual accuracy of a URDF.
     pub fn is_body_off(&self) -> bool {
         let share = self
             .parameters
@@ -235,17 +237,17 @@ impl Finding {
         share.is_some_and(|share| share < LEAST_ABSENT)
     }
 
-    /// Whether it is a fault of the recordings, or of what is said of them, and no physics.
+    /// Whether it is a fault of the recordings or of their description, not physics.
     pub fn is_slip(&self) -> bool {
         slip_words::words(self.known_as()).is_some()
     }
 
-    /// Whether it is such a fault of the recorded velocity alone.
+    /// Whether it is a fault of the recorded velocity alone.
     pub(crate) fn is_of_velocity(&self) -> bool {
         self.known_as() == "velocity_scale"
     }
 
-    /// A parameter's name without its unit, and the unit that its number is in.
+    /// Returns a parameter's name without its unit, and the unit of its value.
     pub fn label_and_unit<'n>(&self, name: &'n str) -> (&'n str, String) {
         let (stem, unit) = words::unit(name).unwrap_or((name, ""));
         (stem, in_units(unit, self.in_amperes, self.slides))
@@ -262,10 +264,10 @@ fn is_false(value: &bool) -> bool {
 pub struct Rival {
     /// Canonical name.
     pub effect: String,
-    /// The joint it is in.
+    /// The joint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
-    /// The link it is in.
+    /// The link.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
 }
@@ -279,7 +281,7 @@ pub struct Rejected {
     pub joint: Option<String>,
     /// The link.
     pub link: Option<String>,
-    /// Why.
+    /// The reason.
     pub reason: String,
 }
 
@@ -291,13 +293,13 @@ pub struct Located {
     /// The state or time as text.
     #[serde(rename = "where")]
     pub place: String,
-    /// Share of the joint's mismatch (sum of squares before correction) that lies there.
+    /// Share of the joint's mismatch (sum of squares before correction) in this state or time.
     pub share_of_residual: f64,
-    /// RMS of the mismatch there over RMS of the noise.
+    /// RMS of the mismatch there relative to the RMS of the noise.
     pub over_noise: f64,
 }
 
-/// The smallest effect that would have been found.
+/// Detection limit of an effect: the smallest size that would have been found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Undetectable {
     /// Canonical name.
@@ -306,33 +308,33 @@ pub struct Undetectable {
     pub joint: Option<String>,
     /// The link.
     pub link: Option<String>,
-    /// By parameter.
+    /// The smallest detectable value, by parameter.
     pub smallest_findable: BTreeMap<String, f64>,
-    /// Whether its efforts are in A and not in N m, whatever the names of its numbers say.
+    /// Whether its efforts are in A and not in N m, regardless of the names of its parameters.
     #[serde(default, skip_serializing_if = "is_false")]
     pub in_amperes: bool,
-    /// Whether its joint slides: its numbers are in N and m, whatever their names say.
+    /// Whether its joint is prismatic: its parameters are in N and m, regardless of their names.
     #[serde(default, skip_serializing_if = "is_false")]
     pub slides: bool,
 }
 
-/// A motion that would separate rivals that tie.
+/// A motion that would distinguish equally likely alternatives.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NextMotion {
-    /// The effects it separates.
+    /// The effects that it distinguishes.
     pub separates: Vec<Rival>,
     /// The instruction as text.
     pub sentence: String,
-    /// A file with the trajectory: header `t,` and joint names, positions in rad or m.
+    /// File with the trajectory: header `t,` and joint names, positions in rad or m.
     pub trajectory: Option<String>,
 }
 
-/// Series for the pictures: one recording, one joint.
+/// Series for the plots: one recording, one joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointPicture {
     /// The joint.
     pub joint: String,
-    /// \[s\]
+    /// Time \[s\].
     pub time_s: Vec<f64>,
     /// Position \[rad or m\].
     pub position: Vec<f64>,
@@ -340,21 +342,21 @@ pub struct JointPicture {
     pub velocity: Vec<f64>,
     /// Measured effort \[effort unit\].
     pub measured: Vec<f64>,
-    /// The twin's effort before.
+    /// The twin's effort before the correction \[effort unit\].
     pub before: Vec<f64>,
-    /// The corrected twin's effort.
+    /// The corrected twin's effort \[effort unit\].
     pub after: Vec<f64>,
 }
 
-/// Everything that is drawn of one recording.
+/// The plots of one recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordingPicture {
     /// The recording.
     pub recording: String,
-    /// Whether nothing was fitted on it.
+    /// Whether the recording was held out of the fit.
     pub held_out: bool,
     /// Stamp of its first sample \[ns since the epoch\].
     pub start_ns: i64,
-    /// By joint, in URDF order; thinned to at most 2000 samples.
+    /// Series by joint, in URDF order; thinned to at most 2000 samples.
     pub joints: Vec<JointPicture>,
 }

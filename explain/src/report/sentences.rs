@@ -1,4 +1,4 @@
-//! Numbers, units and sentences.
+//! Formatting of numbers, units and sentences.
 
 use std::collections::BTreeMap;
 
@@ -10,9 +10,9 @@ use tauscope_dynamics::terms::{Effect, PlaceKind, Words};
 use crate::physics::active::Active;
 use crate::physics::parameter_units::unit;
 
-/// The likelihood ratio of a lead in nats as text, e.g. `40`, `10^17`.
+/// Returns the likelihood ratio of a lead in nats as text, e.g. `40`, `10^17`.
 pub fn odds(nats: f64) -> String {
-    /// From here on powers of ten are easier to read.
+    /// Ratio above which powers of ten are easier to read.
     /// Layout: by eye; no number depends on it.
     const MANY: f64 = 1000.0;
     let odds = nats.max(0.0).exp();
@@ -22,18 +22,19 @@ pub fn odds(nats: f64) -> String {
     format!("10^{:.0}", nats / std::f64::consts::LN_10)
 }
 
-/// From this share of the error on, it is said to have stayed as it was.
+/// Ratio of the errors after and before a correction above which the error is reported as unchanged.
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const UNCHANGED: f64 = 0.98;
 
-/// Share of the error on held-out recordings that a correction leaves: RMS over all joints, after over before. Not a number
-/// where one of them is not known.
+/// Returns the remaining share of the error on held-out recordings: RMS over all joints, after over before. NaN where
+/// one of them is unknown.
 pub fn error_left(before: &[f64], after: &[f64]) -> f64 {
     let norm = |all: &[f64]| all.iter().map(|x| x * x).sum::<f64>().sqrt();
     norm(after) / norm(before)
 }
 
-/// Changes the units of a sentence, or a unit, whose numbers are in A and not in N m, or of a joint that slides.
+/// Replaces the units of a sentence, or a unit, whose numbers are in A and not in N m, or belong to a prismatic
+/// joint.
 pub fn in_units(sentence: &str, amperes: bool, slides: bool) -> String {
     let mut text = sentence.to_owned();
     if amperes {
@@ -42,11 +43,11 @@ pub fn in_units(sentence: &str, amperes: bool, slides: bool) -> String {
     if slides { of_a_slide(&text) } else { text }
 }
 
-/// What is N m and rad of other joints is N and m of one that slides.
+/// Replaces the units of a rotary joint (N m, rad) by those of a prismatic one (N, m).
 fn of_a_slide(sentence: &str) -> String {
     let forces = sentence.replace("N m", "N").replace("kg m²", "kg");
     let forces = forces.replace("(N)", "N");
-    // Not within a word.
+    // Replaces no part of a word.
     let mut text = String::with_capacity(forces.len());
     let mut rest = forces.as_str();
     while let Some(at) = rest.find("rad") {
@@ -60,7 +61,7 @@ fn of_a_slide(sentence: &str) -> String {
     text + rest
 }
 
-/// The unit of a joint's effort, where `unit` is that of most joints.
+/// Returns the unit of a joint's effort, given that of rotary joints.
 pub fn unit_at<'u>(unit: &'u str, joint: &Joint) -> &'u str {
     if unit == "N m" && joint.slides() {
         "N"
@@ -69,11 +70,12 @@ pub fn unit_at<'u>(unit: &'u str, joint: &Joint) -> &'u str {
     }
 }
 
-/// A share that may be zero and is surely less than this is none.
-/// Physical: what a torque sensor says of a joint that it does not measure.
+/// Upper bound of the interval of a share below which it is reported as zero.
+/// Physical: the response of a torque sensor to a joint that it does not measure.
 const MOST_OF_NOTHING: f64 = 0.05;
 
-/// A finding as a sentence. `place` is the name of the joint or link, `recording` that of the recording it is told in.
+/// Returns a finding as a sentence. `place` is the name of the joint or link, `recording` the name of the recording
+/// of its times.
 pub fn sentence(
     active: &Active,
     (place, recording): (&str, Option<&str>),
@@ -126,7 +128,7 @@ pub fn sentence(
     })
 }
 
-/// A finding of which the recordings determine some numbers or none.
+/// Returns the sentence of a finding of which the recordings determine only some parameters or none.
 fn undetermined(
     effect: &Effect,
     place: &str,
@@ -153,7 +155,7 @@ fn undetermined(
     format!("The recordings show {noun}{at}{known}; they do not determine its {missing}.")
 }
 
-/// ` at joint elbow`; empty for an effect that has one place only.
+/// Returns the place, such as ` at joint elbow`; empty for an effect that has only one place.
 fn at(kind: PlaceKind, place: &str) -> String {
     match kind {
         PlaceKind::Joint | PlaceKind::TwoJoints => format!(" at joint {place}"),
@@ -162,14 +164,14 @@ fn at(kind: PlaceKind, place: &str) -> String {
     }
 }
 
-/// `4.1 N m (3.9 to 4.3)`.
+/// Returns a value with its interval, such as `4.1 N m (3.9 to 4.3)`.
 fn with_interval(value: f64, unit: &str, interval: Option<&[f64; 2]>) -> String {
     let mut text = number(value);
     if !unit.is_empty() {
         text += &format!(" {unit}");
     }
     if let Some([low, high]) = interval.map(|ends| ends.map(number)) {
-        // A time may be known better than it is written.
+        // A time may be known more precisely than its text.
         if low != high {
             text += &format!(" ({low} to {high})");
         }

@@ -1,17 +1,17 @@
-//! The words for faults of recordings.
+//! Texts for faults of recordings.
 
-/// The words for a kind of fault.
+/// Texts for a kind of fault.
 #[derive(Debug, Clone, Copy)]
 pub struct SlipWords {
-    /// As a heading.
+    /// Heading.
     pub title: &'static str,
-    /// What it means.
+    /// Meaning of the fault.
     pub meaning: &'static str,
-    /// What to do; `{place}` and `{source}` are filled in.
+    /// Instruction; `{place}` and `{source}` are filled in.
     pub look_at: &'static str,
 }
 
-/// The kinds of faults of recordings that `explain` names.
+/// Returns the kinds of faults of recordings that `explain` reports.
 pub fn recording_faults() -> impl Iterator<Item = &'static str> {
     KINDS.iter().map(|(kind, _)| *kind)
 }
@@ -124,7 +124,7 @@ static KINDS: [(&str, SlipWords); 13] = [
     ),
 ];
 
-/// The words for a kind of fault, if it is one.
+/// Returns the texts for a kind of fault, if it is one.
 pub fn words(kind: &str) -> Option<&'static SlipWords> {
     let found = KINDS.iter().find(|(name, _)| *name == kind);
     found.map(|(_, words)| words)

@@ -1,7 +1,7 @@
-//! Faults of the recordings, or of what is said of them, as findings.
+//! Faults of the recordings or of their description, as findings.
 //!
-//! A fault is an `unknown` with a `kind`: no physics of the arm. The verdict is not that it is explained, unless the fault is
-//! of the velocity alone. All else in the report is of the recordings as they would be without the faults.
+//! A fault is an `unknown` with a `kind`: it is not physics of the arm. The verdict is then not `explained`, unless
+//! the fault is of the velocity alone. All other content of the report is that of the recordings without the faults.
 
 use std::collections::BTreeMap;
 
@@ -13,21 +13,21 @@ use crate::data::remedies::{Remedy, Slip};
 use crate::report::holdout::Proof;
 use crate::report::schema::Finding;
 
-/// The probability that a fault that was found is there.
+/// Probability that a reported fault is present.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const CONFIDENCE: f64 = 0.97;
 
-/// The faults of the recordings that were mended before they were explained.
+/// The faults of the recordings, which are corrected before the recordings are explained.
 #[derive(Debug, Default)]
 pub struct Slips {
-    /// In the order in which they were mended.
+    /// Faults in the order of correction.
     pub all: Vec<Slip>,
-    /// RMS error of the twin on the held-out recordings as they are, by joint \[effort unit\].
+    /// RMS error of the twin on the uncorrected held-out recordings, by joint \[effort unit\].
     as_recorded: Option<Vec<f64>>,
 }
 
 impl Slips {
-    /// Faults that do not concern the efforts.
+    /// Creates a list of faults that do not concern the efforts.
     pub fn new(all: Vec<Slip>) -> Self {
         Self {
             all,
@@ -35,13 +35,14 @@ impl Slips {
         }
     }
 
-    /// Adds faults, and the errors with all that were not mended so far.
+    /// Adds faults, and on the first call the errors before these corrections.
     pub fn add(&mut self, found: Vec<Slip>, errors: Vec<f64>) {
         self.all.extend(found);
         self.as_recorded.get_or_insert(errors);
     }
 
-    /// A finding for each. Its errors are in the recordings' `unit`, of which `unit_nm` are N m, by joint.
+    /// Returns a finding for each fault. Its errors are in the recordings' `unit`; `unit_nm` are N m per unit, by
+    /// joint.
     pub fn findings(&self, joints: &[String], unit: &str, unit_nm: &[f64]) -> Vec<Finding> {
         let as_recorded = |slip: &Slip| {
             let mut slip = slip.clone();
@@ -54,7 +55,7 @@ impl Slips {
         all.map(|slip| finding(&slip, joints, unit)).collect()
     }
 
-    /// That all else is of mended recordings.
+    /// Returns the note that the rest of the report is that of the corrected recordings.
     pub fn note(&self) -> Option<String> {
         let of_velocity =
             |slip: &Slip| matches!(slip.remedy, Remedy::Velocity(..) | Remedy::DropsOut(..));
@@ -76,7 +77,7 @@ impl Slips {
         })
     }
 
-    /// Puts predictions and errors back in the columns and the unit of the recordings as they are.
+    /// Converts predictions and errors back to the columns and the unit of the uncorrected recordings.
     pub fn undo(&self, proof: &mut Proof) {
         let n = proof.after.len();
         for slip in self.all.iter().rev() {
@@ -130,7 +131,7 @@ fn finding(slip: &Slip, joints: &[String], unit: &str) -> Finding {
     }
 }
 
-/// The joint of a fault, and the other joint of an exchange.
+/// Returns the joint of a fault, and the other joint of a swap.
 fn joints_of(remedy: &Remedy) -> (Option<usize>, Option<usize>) {
     match *remedy {
         Remedy::Swapped(a, b) | Remedy::NamesSwapped(a, b) => (Some(a), Some(b)),
@@ -145,7 +146,7 @@ fn joints_of(remedy: &Remedy) -> (Option<usize>, Option<usize>) {
     }
 }
 
-/// What is wrong, the evidence, and what to do.
+/// Returns the fault, the evidence and the instruction.
 fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
     let name = |j: usize| joints[j].as_str();
     let (wrong, cure) = match slip.remedy {
@@ -219,28 +220,28 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
     format!("{wrong} {evidence}{cure}")
 }
 
-/// What is wrong with an effort that is told as a magnitude, and what to do.
+/// Returns fault and instruction for an effort that is recorded as a magnitude.
 fn without_sign(joint: &str) -> (String, String) {
     let wrong = format!(
-        "The effort of {joint} has no sign: it is never below zero, though the motion requires torques of both signs. Nothing else \
-         is said of the joint."
+        "The effort of {joint} has no sign: it is never below zero, though the motion requires torques of both signs. The \
+         joint is not evaluated further."
     );
     let cure = "Let the driver publish the effort with its sign.".to_owned();
     (wrong, cure)
 }
 
-/// The words for an effort that never changes: the fault and its remedy.
+/// Returns fault and instruction for an effort that never changes.
 fn unmeasured(joint: &str, effort: f64, unit: &str) -> (String, String) {
     let wrong = format!(
-        "The effort of {joint} stays the same through each recording, such as {} {unit}, while the joint moves: nothing \
-         measures it, and nothing is said of the joint.",
+        "The effort of {joint} stays the same through each recording, such as {} {unit}, while the joint moves: it is \
+         not measured, and the joint is not evaluated further.",
         number(effort)
     );
     let cure = "Look at its sensor, or at what the driver fills in.";
     (wrong, cure.to_owned())
 }
 
-/// The words for an effort that drops to zero for moments: the fault and its remedy.
+/// Returns fault and instruction for an effort that briefly drops to zero.
 fn drops_out(joint: &str, messages: u64) -> (String, String) {
     let wrong = format!(
         "The effort of {joint} drops to exactly zero for moments, in {messages} messages; their rows are left out."
@@ -251,7 +252,7 @@ fn drops_out(joint: &str, messages: u64) -> (String, String) {
     )
 }
 
-/// How far off torque constants are that must be multiplied by `factor`.
+/// Returns the error of torque constants that must be multiplied by `factor`.
 fn times_off(factor: f64) -> String {
     if factor > 1.0 {
         format!("{} times too small", number(factor))
@@ -260,7 +261,7 @@ fn times_off(factor: f64) -> String {
     }
 }
 
-/// What was tried, and what it gave.
+/// Returns the evidence: the tried correction and its result.
 fn evidence(slip: &Slip, joints: &[String], unit: &str) -> String {
     let mut text = String::new();
     if !slip.mended.is_empty() {
@@ -270,16 +271,16 @@ fn evidence(slip: &Slip, joints: &[String], unit: &str) -> String {
         };
         let falls: Vec<String> = slip.mended.iter().map(of).collect();
         text += &format!(
-            "Tried: with that mended, the error beside friction falls {}, in every recording. ",
+            "Tried: with this corrected, the error after friction falls {}, in every recording. ",
             falls.join(", ")
         );
     }
     let is_effort = !matches!(slip.remedy, Remedy::Velocity(..));
     if is_effort && !slip.slopes.is_empty() {
-        let of = |(j, slope): &(usize, f64)| format!("{} times at {}", number(*slope), joints[*j]);
+        let of = |(j, slope): &(usize, f64)| format!("{} at {}", number(*slope), joints[*j]);
         let slopes: Vec<String> = slip.slopes.iter().map(of).collect();
         text += &format!(
-            "The measured effort is so many times what the motion requires: {}. ",
+            "Ratio of the measured to the required effort: {}. ",
             slopes.join(", ")
         );
     }

@@ -4,8 +4,8 @@ use crate::report::look_at::look_at;
 use crate::report::schema::{Finding, Remaining, Verdict};
 use crate::report::sentences::{UNCHANGED, error_left};
 
-/// The verdict in a sentence. `errors` are those on held-out recordings by joint, before and after. Where the arm was sound
-/// before and `has_changed`, the likely part is named.
+/// Returns the verdict in a sentence. `errors` are those on held-out recordings by joint, before and after. If the
+/// arm was healthy before and `has_changed`, the likely part is named.
 pub fn summary(
     verdict: Verdict,
     findings: &[Finding],
@@ -20,17 +20,17 @@ pub fn summary(
     let remains = remains.map_or("", |remaining| remaining.sentence.as_str());
     match verdict {
         Verdict::NothingMissing => {
-            // A fault of the velocity may be there.
+            // A fault of the velocity may be present.
             let faults = findings.iter().map(|fault| format!("{} ", fault.sentence));
-            let nothing = "Nothing is missing: what the twin leaves does not follow the motion. It is the noise of the measurement.";
+            let nothing = "Nothing is missing: the residual of the twin does not follow the motion. It is measurement noise.";
             faults.chain([nothing.to_owned()]).collect()
         }
         Verdict::NotEvaluated => "Nothing was evaluated.".to_owned(),
         Verdict::UnknownRemains if findings.is_empty() => {
-            format!("Something remains without a named cause. {remains}")
+            format!("Part of the mismatch has no named cause. {remains}")
         }
         Verdict::Explained | Verdict::UnknownRemains => {
-            // A fault of the recordings, or else that with the largest effort.
+            // A fault of the recordings, or else the finding with the largest effort.
             let larger = |a: &&Finding, b: &&Finding| a.effort_rms.total_cmp(&b.effort_rms);
             let fault = findings.iter().find(|finding| finding.is_slip());
             let first = fault.or_else(|| findings.iter().rev().max_by(larger));
@@ -52,7 +52,8 @@ pub fn summary(
     }
 }
 
-/// What the correction does to the error on held-out recordings: over all joints, and at a joint that it makes worse.
+/// Returns the effect of the correction on the error on held-out recordings: over all joints, and at the joint where
+/// it increases most.
 fn proof(joints: &[String], [before, after]: [&[f64]; 2]) -> String {
     let left = error_left(before, after);
     if !left.is_finite() {
@@ -67,7 +68,7 @@ fn proof(joints: &[String], [before, after]: [&[f64]; 2]) -> String {
             100.0 * left
         )
     } else {
-        " On recordings that were not fitted it makes no difference.".to_owned()
+        " On recordings that were not fitted the correction makes no difference.".to_owned()
     };
     let times = |j: usize| after[j] / before[j];
     let worse = (0..joints.len()).filter(|&j| times(j) * UNCHANGED > 1.0);

@@ -4,9 +4,9 @@ use tauscope_dynamics::terms::UNKNOWN;
 
 use crate::report::schema::{Finding, Remaining, Verdict};
 
-/// The verdict, given what remains beyond the noise. Where the `twin_is_topic`, a remainder beside findings decides
-/// nothing: another simulation has its own delays and friction, and they are no physics of the arm. A fault of the
-/// recorded velocity does not decide, because velocities are computed from the positions.
+/// Returns the verdict, given the remaining residual. If the `twin_is_topic`, a remaining residual next to findings
+/// does not decide: another simulation has delays and friction of its own, which are not physics of the arm. A fault
+/// of the recorded velocity does not decide, because velocities are computed from the positions.
 pub fn verdict(findings: &[Finding], remaining: &[Remaining], twin_is_topic: bool) -> Verdict {
     let findings: Vec<&Finding> = findings.iter().filter(|f| !f.is_of_velocity()).collect();
     let is_described = |f: &&Finding| f.effect == UNKNOWN.name && !f.is_body_off();

@@ -1,28 +1,28 @@
-//! What remains at a joint, as a finding: something is there, and nothing that was tried describes it.
+//! The remaining residual of a joint as a finding: no effect or curve that was tried describes it.
 //!
-//! Programs that read the findings alone learn so which joint to look at. The twin stays as it is, for there is nothing to
-//! correct it by.
+//! So programs that read only the findings learn which joint to inspect. The twin stays unchanged, because there is
+//! no correction.
 
 use serde_json::Value;
 use tauscope_dynamics::terms::UNKNOWN;
 
 use crate::report::schema::{Finding, Remaining, WITHOUT_LAW};
 
-/// A joint is told if it leaves at least this share of what the joint leaves that leaves most, each in units of its noise: what
-/// happens at one joint is felt at its neighbours, too.
+/// Smallest remaining residual of a reported joint, relative to the joint with the largest one, each in units of its
+/// noise: an effect at one joint also loads its neighbours.
 /// Tuned: by hand, with `tests/proof/first_sight.py` in view, seeds 41 and 42 beside friction and bodies; not swept.
 const LEAST_SHARE: f64 = 0.5;
-/// A fault lies at the only joint that leaves something, and at one of several that leave as much.
-/// Tuned: of those told alone, all 12 were right in `tests/proof/first_sight.py`, seeds 41 and 42, whose faults have no law,
-/// and 15 of 27 in `tests/proof/reliability.py`, seeds 6001 to 6300, most of whose effects have one.
+/// Confidence of a finding at the only joint with a remaining residual, and at one of several with similar ones.
+/// Tuned: of those reported alone, all 12 were right in `tests/proof/first_sight.py`, seeds 41 and 42, whose faults
+/// have no law, and 15 of 27 in `tests/proof/reliability.py`, seeds 6001 to 6300, most of whose effects have one.
 const CONFIDENCE_ALONE: f64 = 0.7;
 const CONFIDENCE_AMONG: f64 = 0.6;
-/// What is more likely right than wrong tells of the joint already.
+/// Smallest confidence of an `unknown` that already reports the joint.
 /// Statistical: as `verdict::NAMES`.
 const TELLS: f64 = 0.5;
 
-/// Findings for the joints with the largest residual, where none of the findings `said` is an `unknown` of the joint.
-/// `in_amperes`: the efforts of the recordings are currents.
+/// Returns findings for the joints with the largest remaining residual, unless the findings `said` have an `unknown`
+/// at the joint. `in_amperes`: the efforts of the recordings are currents.
 pub fn findings(
     remaining: &[Remaining],
     said: &[Finding],
@@ -67,7 +67,7 @@ fn finding(remaining: &Remaining, confidence: f64) -> Finding {
         confidence,
         effort_rms: remaining.largest_rms(),
         sentence: format!(
-            "Joint {} has something that no effect or curve describes. {}",
+            "Joint {} has a residual that no effect or curve describes. {}",
             remaining.joint, remaining.sentence
         ),
         ..Finding::default()
@@ -114,7 +114,7 @@ mod tests {
     fn a_joint_with_an_unknown_already_is_not_told_twice() {
         let mut curve = fixture::finding("unknown");
         assert_eq!(told(&[("joint1", 4.0)], std::slice::from_ref(&curve)), []);
-        // A curve that is probably wrong does not tell of it.
+        // A curve that is probably wrong does not report the joint.
         curve.confidence = 0.3;
         assert_eq!(told(&[("joint1", 4.0)], &[curve]).len(), 1);
     }

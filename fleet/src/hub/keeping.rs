@@ -1,4 +1,4 @@
-//! A file that cannot be written for a while: what happens meanwhile waits, and it is said that it does.
+//! Handling of a store that temporarily cannot be written: events are queued meanwhile, and the failure is reported.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -7,12 +7,12 @@ use crate::keeper::{Deed, Keeper};
 use crate::store::StoreError;
 use crate::wall::{Effect, Snapshot, Wall};
 
-/// What waits for the file at most. Resolution: memory; a day of a busy plant.
+/// Maximum number of queued events. Resolution: memory; a day of a busy plant.
 const MOST: usize = 10_000;
-/// How often it is looked whether the file can be written again. Resolution: a person sees no more.
+/// Interval between tests whether the file can be written again. Resolution: a person sees no more.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// What is to be kept.
+/// An event to be stored.
 #[derive(Debug)]
 enum News {
     Effect(Effect),
@@ -33,9 +33,9 @@ impl News {
 pub struct Keeping {
     keeper: Keeper,
     failing: Option<Failing>,
-    /// What is to be kept, and when it happened \[ns since the epoch\].
+    /// Events to be stored, with their times \[ns since the epoch\].
     waiting: VecDeque<(News, i64)>,
-    /// What had no room among those.
+    /// Number of events that were dropped because the queue was full.
     lost: u64,
 }
 
@@ -55,14 +55,14 @@ impl Keeping {
         }
     }
 
-    /// Keeps it, now or later.
+    /// Stores an effect, now or once the file can be written.
     pub fn keep(&mut self, wall: &Wall, effect: Effect, now_ns: i64) {
         if self.failing.is_none() || effect.is_kept() {
             self.keep_news(wall, News::Effect(effect), now_ns);
         }
     }
 
-    /// Keeps what somebody has done, now or later.
+    /// Stores a user's action, now or once the file can be written.
     pub fn take(&mut self, wall: &Wall, deed: Deed, now_ns: i64) {
         self.keep_news(wall, News::Deed(deed), now_ns);
     }
@@ -81,7 +81,7 @@ impl Keeping {
         self.waiting.push_back((news, now_ns));
     }
 
-    /// What is due by the clock; and what waits, where the file can be written again.
+    /// Does the periodic work, and stores the queued events once the file can be written again.
     pub fn tick(&mut self, wall: &Wall, snapshot: &mut Snapshot) {
         self.look(wall);
         self.keeper.compare(snapshot);
@@ -123,7 +123,7 @@ impl Keeping {
         }
         let why = error.to_string();
         tracing::warn!("incidents are not kept: {why}; they wait until they can be");
-        // The wall does not stand still for a file that somebody else holds.
+        // The wall must not block on a file that another program holds.
         self.keeper.store().waits_for_others(false);
         self.failing = Some(Failing {
             why,
@@ -212,7 +212,7 @@ mod tests {
         other.hold().unwrap();
         let begin = Instant::now();
         (2..10).for_each(|number| keeping.keep(&wall, contact(number), 0));
-        // It waits for the other one once, and not for each.
+        // It waits for the other program once, not for each contact.
         assert!(begin.elapsed() < Duration::from_secs(6), "{begin:?}");
         let mut snapshot = wall.snapshot();
         keeping.tick(&wall, &mut snapshot);

@@ -1,4 +1,4 @@
-//! The nightly tables, read beside the wall.
+//! Periodic reading of the nightly tables, on a thread of its own.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,9 +9,10 @@ use super::{TICK, unix_ns};
 use crate::physics::{self, CellPhysics};
 use crate::store::{KEPT_NS, Store, baselines};
 
-/// How often the nightly tables are read again. Resolution: they come once a night, and a note counts within minutes.
+/// Interval between readings of the nightly tables. Resolution: they come once a night, and a note takes effect
+/// within minutes.
 const PHYSICS_EVERY: Duration = Duration::from_mins(5);
-/// Reads the nightly tables again and again until the fleet host ends.
+/// Reads the nightly tables periodically until the fleet host stops.
 pub fn follow(
     folder: &Path,
     notes: Option<&Store>,

@@ -1,4 +1,4 @@
-//! What is kept, as statements.
+//! Tests of the keeper.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use crate::wall::StaleWhy;
 
 const SECOND: i64 = 1_000_000_000;
 
-/// A keeper, and what the wall tells it of the cell `a`.
+/// A keeper that stores the wall's effects for the cell `a`.
 struct Story {
     _folder: tempfile::TempDir,
     path: PathBuf,
@@ -34,7 +34,7 @@ impl Story {
         }
     }
 
-    /// What a cell told under this number.
+    /// Stores a record that a cell sent under this number.
     fn try_record(&mut self, number: u64, record: Record) -> Result<(), StoreError> {
         self.tell(number, record, self.now_ns)
     }
@@ -50,7 +50,7 @@ impl Story {
         self.keeper.keep(&self.wall, &effect, self.now_ns)
     }
 
-    /// Takes records, number by number from 1 on.
+    /// Stores records, numbered from 1 on.
     fn records(&mut self, records: &[Record]) {
         for (number, record) in (1..).zip(records) {
             self.try_record(number, record.clone()).unwrap();
@@ -93,7 +93,7 @@ fn a_contact_is_kept_with_its_incident_or_not_at_all() {
     let store = story.keeper.store();
     assert_eq!(store.contacts("a", 9).unwrap(), []);
     other.execute_batch("DROP TRIGGER t").unwrap();
-    // It is told again once the file can be written.
+    // The record is stored when it is sent again and the file can be written.
     story.try_record(1, record).unwrap();
     let store = story.keeper.store();
     assert_eq!(store.contacts("a", 9).unwrap().len(), 1);
@@ -103,7 +103,7 @@ fn a_contact_is_kept_with_its_incident_or_not_at_all() {
     );
 }
 
-/// The first contact is over and acknowledged, the second one is latched and nobody has seen it.
+/// Records of a contact that is over and acknowledged, and of one that is latched and not acknowledged.
 fn two_contacts() -> Vec<Record> {
     let first = fixture::contact(1, 5);
     let ended = ContactMessage {
@@ -151,7 +151,7 @@ fn an_old_contact_whose_end_is_heard_late_ends_no_incident_of_a_newer_one() {
     let records = two_contacts();
     story.try_record(1, records[0].clone()).unwrap();
     story.again();
-    // The newest is heard as it comes, and what was missed behind it.
+    // The newest record arrives first, and the missed ones after it.
     for number in [4, 2, 3] {
         let record = records[number - 1].clone();
         story.try_record(number as u64, record).unwrap();
@@ -208,7 +208,7 @@ fn a_cell_with_a_wrong_clock_has_its_incidents_at_the_time_of_the_fleet_host() {
     let yesterday_ns = now_ns - DAY_NS;
     for (told_ns, opened_ns) in [
         (now_ns, now_ns),
-        // What is told late was so when it was.
+        // A record that arrives late keeps its own time.
         (yesterday_ns, yesterday_ns),
         (5, now_ns),
         (900 * DAY_NS, now_ns),

@@ -9,13 +9,13 @@ use tauscope_condition::Estimate;
 
 use super::PhysicsError;
 
-/// What a table's name begins with.
+/// Prefix of the file name of a table.
 pub const TABLE: &str = "physics";
 const NS_A_DAY: f64 = 86_400e9;
-/// No table is larger. Resolution: a night has some forty rows.
+/// Maximum size of a table \[bytes\]. Resolution: a night has some forty rows.
 const MOST_BYTES: u64 = 16 << 20;
 
-/// A column: its name, and its value of a row.
+/// A column: its name, and the accessor of its value in a row.
 pub type Column<T> = (&'static str, fn(&Row) -> T);
 /// A column of texts.
 pub type TextColumn = (&'static str, fn(&Row) -> &String);
@@ -27,19 +27,19 @@ pub struct Row {
     pub cell: String,
     /// The robot's name in its URDF.
     pub robot: String,
-    /// The arm: what keeps its history when it moves to another cell.
+    /// The arm, which keeps its history when it moves to another cell.
     pub arm: String,
-    /// The joint; empty for what belongs to the whole arm.
+    /// The joint; empty for a number of the whole arm.
     pub joint: String,
     /// The number's name.
     pub quantity: String,
     /// Its unit.
     pub unit: String,
-    /// SHA-256 of the twin that it was measured beside; empty without one.
+    /// SHA-256 of the twin that was used for the measurement; empty without one.
     pub twin_sha256: String,
     /// Stamp of the first recording \[ns since the epoch\].
     pub stamp_ns: u64,
-    /// How many recordings it rests on.
+    /// Number of recordings used.
     pub recordings: u64,
     /// The estimate.
     pub value: f64,
@@ -47,9 +47,9 @@ pub struct Row {
     pub low_95: f64,
     /// Upper end.
     pub high_95: f64,
-    /// Temperature of the joint, NaN where it is not known \[deg C\].
+    /// Temperature of the joint, NaN if it is unknown \[deg C\].
     pub temperature_c: f64,
-    /// How long the robot had run, NaN where it is not known \[h\].
+    /// Time since the start of the robot, NaN if it is unknown \[h\].
     pub hours_since_start: f64,
 }
 
@@ -78,7 +78,7 @@ impl Row {
         ("hours_since_start", |row| row.hours_since_start),
     ];
 
-    /// As an estimate.
+    /// Converts it to an estimate.
     pub fn estimate(&self) -> Estimate {
         let known = |value: f64| value.is_finite().then_some(value);
         Estimate {
@@ -99,7 +99,7 @@ pub fn folder_of(history: &Path, cell: &str, date: &str) -> PathBuf {
         .join(format!("date={date}"))
 }
 
-/// All rows since a day, and the tables that cannot be read.
+/// Returns all rows since a day, and the errors of tables that cannot be read.
 pub(super) fn rows(
     folder: &Path,
     since_day: f64,
@@ -139,7 +139,7 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>, PhysicsError> {
     Ok(paths)
 }
 
-/// The folders that begin so, with what stands behind.
+/// Returns the folders with this prefix, and the rest of their names.
 fn parts(folder: &Path, prefix: &str) -> Result<Vec<(String, PathBuf)>, PhysicsError> {
     let named = entries(folder)?.into_iter().filter_map(|path| {
         let name = path.file_name()?.to_string_lossy().into_owned();
@@ -182,7 +182,7 @@ fn table(path: &Path) -> Result<Vec<Row>, PhysicsError> {
     Ok(rows)
 }
 
-/// `None` where a column is missing or of another type.
+/// Appends the rows of a batch. Returns `None` if a column is missing or has another type.
 fn of_batch(batch: &RecordBatch, rows: &mut Vec<Row>) -> Option<()> {
     let column = |name: &str| batch.column_by_name(name);
     let texts: Vec<&StringArray> = Row::TEXTS

@@ -5,13 +5,13 @@ use rusqlite::params;
 use super::{Store, StoreError};
 use crate::wall::Remembered;
 
-/// A file of before does not know which runs have ended; one that does is read by programs of before.
+/// Table of ended runs. It was added later: older files lack it, and older programs ignore it.
 pub(super) const TABLE: &str = "
     CREATE TABLE IF NOT EXISTS ended (cell TEXT PRIMARY KEY, at_ns INTEGER NOT NULL) WITHOUT ROWID;
 ";
 
 impl Store {
-    /// A cell was seen.
+    /// Stores that a cell was seen.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -24,7 +24,7 @@ impl Store {
         done.map(|_| ()).map_err(|error| self.failed(error))
     }
 
-    /// The run of a cell has ended in order, or (`None`) it has not.
+    /// Stores the time of the normal end of a cell's run; `None` if it has not ended.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -39,7 +39,7 @@ impl Store {
         done.map(|_| ()).map_err(|error| self.failed(error))
     }
 
-    /// The cells that were ever seen.
+    /// Returns the cells that were ever seen.
     ///
     /// # Errors
     /// If the file cannot be read.

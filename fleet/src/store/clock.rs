@@ -1,7 +1,8 @@
-//! The time by which what is old is removed.
+//! The time by which old data are removed.
 //!
-//! Clocks are set wrong and set right again, and what is removed is gone. So a clock that jumps far ahead is believed only
-//! after a day. The time that was believed last is kept in the file, so that a start is no way around that.
+//! A clock may be set wrong and corrected later, but removed data are lost. So a clock that jumps far ahead is
+//! accepted only after a day. The last accepted time is stored in the file, so that a restart does not bypass this
+//! delay.
 
 use std::time::{Duration, Instant};
 
@@ -9,20 +10,20 @@ use rusqlite::OptionalExtension as _;
 
 use super::{Store, StoreError};
 
-/// A file of before knows no time; one that does is read by programs of before.
+/// Table of the accepted time. It was added later: older files lack it, and older programs ignore it.
 pub(super) const TABLE: &str = "CREATE TABLE IF NOT EXISTS believed (at_ns INTEGER NOT NULL);";
-/// A clock that is ahead by more than this of what was believed has jumped, or nobody was here for long \[ns\].
-/// Resolution: what is kept for a year may go a week early.
+/// Largest advance over the accepted time without a jump of the clock or a long time off \[ns\].
+/// Resolution: data kept for a year may be removed a week early.
 const JUMP_NS: i64 = 7 * 86_400_000_000_000;
-/// So long after a jump ahead the clock is believed.
+/// Delay after which a clock that jumped ahead is accepted.
 /// Resolution: somebody looks at a plant once a day.
 const BELIEVED_AFTER: Duration = Duration::from_hours(24);
 
-/// Removes what is old.
+/// Periodic removal of old data.
 #[derive(Debug)]
 pub struct Aging {
     begin: Instant,
-    /// Known once the file has been asked.
+    /// `None` until the file has been read.
     steady: Option<Steady>,
 }
 
@@ -36,7 +37,7 @@ impl Default for Aging {
 }
 
 impl Aging {
-    /// Removes from `store` what is older than it is kept, where the clock says `now_ns` \[ns since the epoch\].
+    /// Removes data older than the retention time from `store`, at the clock time `now_ns` \[ns since the epoch\].
     ///
     /// # Errors
     /// If the file cannot be read or written.
@@ -55,17 +56,17 @@ impl Aging {
     }
 }
 
-/// The clock of this host, which is not believed at once when it jumps ahead.
+/// The clock of this host, with a delay before a jump ahead is accepted.
 #[derive(Debug, Clone, Copy)]
 struct Steady {
-    /// What was believed last \[ns since the epoch\], and when, by a clock that only runs.
+    /// Last accepted time \[ns since the epoch\], and the monotonic time of its acceptance.
     last: (i64, Duration),
-    /// Since when it is not.
+    /// Monotonic time since which the clock is ahead and not accepted.
     ahead: Option<Duration>,
 }
 
 impl Steady {
-    /// Since `believed_ns`, which was believed at `running`.
+    /// Creates a clock with the time `believed_ns`, accepted at the monotonic time `running`.
     fn new(believed_ns: i64, running: Duration) -> Self {
         Self {
             last: (believed_ns, running),
@@ -73,7 +74,7 @@ impl Steady {
         }
     }
 
-    /// The time as far as it is believed, where the clock says `now_ns` \[ns since the epoch\].
+    /// Returns the accepted time at the clock time `now_ns` \[ns since the epoch\].
     fn read(&mut self, now_ns: i64, running: Duration) -> i64 {
         let passed = running.saturating_sub(self.last.1).as_nanos();
         let passed_ns = i64::try_from(passed).unwrap_or(i64::MAX);
@@ -90,7 +91,7 @@ impl Steady {
 }
 
 impl Store {
-    /// What was believed last \[ns since the epoch\]; nothing in a new file.
+    /// Returns the last accepted time \[ns since the epoch\]; `None` in a new file.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -100,7 +101,7 @@ impl Store {
         found.optional().map_err(|error| self.failed(error))
     }
 
-    /// This time is believed.
+    /// Stores the accepted time.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -134,13 +135,13 @@ mod tests {
         };
         assert_eq!(after(5, 0), 5);
         assert_eq!(after(6, 17_520), 6);
-        // It is set right, also backwards.
+        // The clock is corrected, also backwards.
         assert_eq!(after(7, 0), 7);
         assert_eq!(after(8, -8), 0);
         assert_eq!(after(9, 17_520), 1);
         assert_eq!(after(32, 17_520), 24);
         assert_eq!(after(33, 17_520), 33 + 17_520);
-        // A host that was away for a weekend is believed at once.
+        // The clock of a host that was off for a weekend is accepted at once.
         assert_eq!(after(34, 17_520 + 60), 34 + 17_520 + 60);
     }
 }

@@ -1,4 +1,4 @@
-//! Contacts, and which records of the cells were heard.
+//! Contacts, and the records received from the cells.
 
 use rusqlite::{OptionalExtension as _, params};
 use serde::Serialize;
@@ -6,13 +6,14 @@ use tauscope_publish::message::ContactMessage;
 
 use super::{Store, StoreError};
 
-/// A file of before does not know which records were heard; one that does is read by programs of before.
+/// Table of received records. It was added later: older files lack it, and older programs ignore it.
 pub(super) const TABLES: &str = "
     CREATE TABLE IF NOT EXISTS heard (
         cell TEXT NOT NULL, instance TEXT NOT NULL, number INTEGER NOT NULL, at_ns INTEGER NOT NULL,
         PRIMARY KEY (cell, instance, number)) WITHOUT ROWID;
 ";
-/// When each contact came, by the clock of the fleet host: its own stamps are of the cell's clock, which may be wrong.
+/// Table of arrival times of contacts by the clock of the fleet host. Their own stamps are by the cell's clock, which
+/// may be wrong.
 pub(super) const ARRIVALS: &str = "
     CREATE TABLE IF NOT EXISTS arrivals (
         cell TEXT NOT NULL, instance TEXT NOT NULL, number INTEGER NOT NULL, at_ns INTEGER NOT NULL,
@@ -20,26 +21,26 @@ pub(super) const ARRIVALS: &str = "
     INSERT INTO arrivals SELECT cell, instance, number, onset_ns FROM contacts;
 ";
 
-/// A contact as it is kept.
+/// A stored contact.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KeptContact {
-    /// What the cell told of it.
+    /// The cell's report of it.
     #[serde(flatten)]
     pub contact: ContactMessage,
-    /// The cell's computer then.
+    /// The cell's computer at that time.
     pub host: String,
-    /// Where its recorder wrote.
+    /// Path of the cell's recorded archive; `None` without a recorder.
     pub archive: Option<String>,
 }
 
-/// What a record says of a contact beyond what is kept.
+/// New information in a record of a contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Said {
-    /// It is a new contact.
+    /// A new contact.
     New,
-    /// More is known of it.
+    /// More about a known contact.
     More,
-    /// Nothing.
+    /// Nothing new.
     Nothing,
 }
 
@@ -48,7 +49,8 @@ fn signed(number: u64) -> i64 {
 }
 
 impl Store {
-    /// Notes that the record `number` of a life was heard at `at_ns`. Whether it is the first time.
+    /// Stores that the record `number` of a publisher instance was received at `at_ns`. Returns whether it is the
+    /// first time.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -66,7 +68,7 @@ impl Store {
             .map_err(|error| self.failed(error))
     }
 
-    /// Keeps what is known of a contact, which came at `at_ns`.
+    /// Stores or updates a contact, received at `at_ns`. Returns what was new.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -87,7 +89,7 @@ impl Store {
             .query_row(known, key, |row| row.get(0))
             .optional()
             .map_err(|error| self.failed(error))?;
-        // What was guessed while it lasted takes nothing back of what was known at its end.
+        // Estimates made during the contact do not overwrite the result at its end.
         let text =
             "INSERT INTO contacts VALUES (?1,?2,?3,?4,?5,?6,?7,?8,?9,?10,?11,?12,?13,?14,?15)
                     ON CONFLICT DO UPDATE SET kind = ?5, link = ?6, end_ns = coalesce(?9, end_ns),
@@ -128,7 +130,7 @@ impl Store {
         })
     }
 
-    /// Whether a detector has told of no contact of this life behind the one with this number.
+    /// Returns whether this is the newest contact of its detector and publisher instance.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -145,7 +147,7 @@ impl Store {
         found.map_err(|error| self.failed(error))
     }
 
-    /// The newest contacts of a cell.
+    /// Returns the newest contacts of a cell.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -161,7 +163,7 @@ impl Store {
                     detector: row.get(1)?,
                     kind: row.get(2)?,
                     link: row.get(3)?,
-                    // The newest message tells it; the tables keep the link that is told first.
+                    // Only the newest message has a second link; the tables store the first one.
                     other_link: None,
                     begin_ns: row.get(4)?,
                     onset_ns: row.get(5)?,

@@ -1,4 +1,4 @@
-//! The residual by joint over weeks, and what is normal for a cell.
+//! The residual by joint over weeks, and the normal residual of a cell.
 
 use rusqlite::params;
 use serde::Serialize;
@@ -7,9 +7,9 @@ use super::{Store, StoreError};
 
 const HOUR_NS: i64 = 3_600_000_000_000;
 const DAY_NS: i64 = 24 * HOUR_NS;
-/// Minutes of residual that make a normal. Resolution: an hour covers a warm arm and its program.
+/// Minimum number of minutes of a normal residual. Resolution: an hour covers a warm arm and its program.
 const NORMAL_MINUTES: i64 = 60;
-/// Hours behind a baseline from which the normal is learned. Resolution: a day and a night.
+/// Hours after a baseline from which the normal residual is learned. Resolution: a day and a night.
 const NORMAL_HOURS: u32 = 24;
 
 /// A joint's residual on one day \[effort unit\].
@@ -27,11 +27,11 @@ pub struct Day {
     pub high: f64,
     /// Mean: the joint's offset.
     pub mean: f64,
-    /// Minutes that it rests on.
+    /// Number of minutes used.
     pub minutes: i64,
 }
 
-/// What is normal for a joint \[effort unit\].
+/// Normal residual of a joint \[effort unit\].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct JointNormal {
     /// The joint.
@@ -66,7 +66,7 @@ impl Store {
         done.map(|_| ()).map_err(|error| self.failed(error))
     }
 
-    /// A cell's residual by day and joint since `since_ns`.
+    /// Returns a cell's residual by day and joint since `since_ns`.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -88,7 +88,7 @@ impl Store {
         })
     }
 
-    /// The stamp of the newest baseline of a cell: a note says that from there on it is another arm.
+    /// Returns the stamp of the newest baseline of a cell: a note that from then on it is another arm.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -98,13 +98,14 @@ impl Store {
         found.map_err(|error| self.failed(error))
     }
 
-    /// What is normal for a cell: its first day behind the newest baseline; nothing before that has an hour.
+    /// Returns the normal residual of a cell, learned over the first day after the newest baseline. A joint with less
+    /// than an hour of data is omitted.
     ///
     /// # Errors
     /// If the file cannot be read.
     pub fn normals(&self, cell: &str) -> Result<Vec<JointNormal>, StoreError> {
         let since_ns = self.baseline_ns(cell)?.unwrap_or(0);
-        // The hour of the baseline itself holds minutes from before it.
+        // The hour of the baseline itself contains minutes from before it.
         let text = "SELECT joint, sum(squares) / sum(minutes) FROM
                     (SELECT *, row_number() OVER (PARTITION BY joint ORDER BY hour_ns) AS place
                      FROM history WHERE cell = ?1 AND hour_ns >= ?2)

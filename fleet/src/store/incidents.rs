@@ -1,4 +1,4 @@
-//! Incidents: one for each cause, however often it comes.
+//! Incidents: one for each cause, also if it recurs.
 
 use rusqlite::{OptionalExtension as _, params};
 use serde::Serialize;
@@ -6,25 +6,25 @@ use serde::Serialize;
 use super::{Store, StoreError};
 use crate::wall::Severity;
 
-/// What comes again within this time is the same incident \[ns\]. Resolution: a shift looks at it once.
+/// Time within which a recurrence belongs to the same incident \[ns\]. Resolution: a shift looks at it once.
 pub const REOPEN_NS: i64 = 600_000_000_000;
 
-/// What kind of cause.
+/// Kind of cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// Something touched the robot.
+    /// A contact with the robot.
     Contact,
-    /// The arm has changed.
+    /// A change of the arm.
     Change,
-    /// The cell is stale or unknown.
+    /// A stale or unknown cell.
     Silence,
-    /// Samples were lost.
+    /// A loss of samples.
     Loss,
 }
 
 impl Kind {
-    /// In a word, as in the file.
+    /// Returns its name in the file.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Contact => "contact",
@@ -35,20 +35,20 @@ impl Kind {
     }
 }
 
-/// Something that belongs to an incident.
+/// An occurrence of an incident.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct News {
     /// The cell.
     pub cell: String,
     /// The kind of the cause.
     pub kind: Kind,
-    /// What tells it from other causes of the kind: a link, a stage, a joint.
+    /// Subject that distinguishes it from other causes of the kind: a detector, a stage, an effect with its joints.
     pub place: String,
-    /// How much it matters.
+    /// Its severity.
     pub severity: Severity,
-    /// What has happened.
+    /// Its description.
     pub words: String,
-    /// When \[ns since the epoch\].
+    /// Its time \[ns since the epoch\].
     pub at_ns: i64,
 }
 
@@ -61,23 +61,23 @@ pub struct Incident {
     pub cell: String,
     /// The kind of the cause.
     pub kind: String,
-    /// How much it matters.
+    /// Its severity.
     pub severity: Severity,
-    /// What has happened.
+    /// Description of its newest occurrence.
     pub words: String,
-    /// When it began \[ns since the epoch\].
+    /// Start time \[ns since the epoch\].
     pub opened_ns: i64,
-    /// When it came last \[ns since the epoch\].
+    /// Time of the newest occurrence \[ns since the epoch\].
     pub last_ns: i64,
-    /// When it ended; `None` while it lasts \[ns since the epoch\].
+    /// End time; `None` while it lasts \[ns since the epoch\].
     pub closed_ns: Option<i64>,
-    /// How often it came.
+    /// Number of occurrences.
     pub count: i64,
-    /// How often it was opened again.
+    /// Number of times it was reopened.
     pub reopened: i64,
-    /// When somebody acknowledged it \[ns since the epoch\].
+    /// Time of the acknowledgement \[ns since the epoch\].
     pub acknowledged_ns: Option<i64>,
-    /// Who.
+    /// User who acknowledged it.
     pub acknowledged_by: Option<String>,
 }
 
@@ -100,7 +100,7 @@ fn severity(number: i64) -> Severity {
 }
 
 impl Store {
-    /// Adds to the open incident of this cause, opens one again that ended less than 10 minutes ago, or begins one.
+    /// Adds to the open incident of this cause, reopens one that ended less than 10 minutes ago, or begins one.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -116,7 +116,7 @@ impl Store {
             .optional()
             .map_err(failed)?;
         let same = last.filter(|(_, closed_ns)| {
-            // One that was long over before is another one, too: its stamp is of a clock that was set back.
+            // A stamp long before the end is of a clock that was set back, and begins another incident, too.
             closed_ns.is_none_or(|closed_ns| {
                 let apart_ns = news.at_ns.saturating_sub(closed_ns);
                 apart_ns.saturating_abs() < REOPEN_NS
@@ -146,7 +146,7 @@ impl Store {
         Ok(())
     }
 
-    /// More is known of the open incident of this cause: it did not come again. Whether there is one.
+    /// Updates the open incident of this cause without counting an occurrence. Returns whether there is one.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -160,7 +160,7 @@ impl Store {
             .map_err(|error| self.failed(error))
     }
 
-    /// The cause is over.
+    /// Closes the open incident of this cause.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -172,8 +172,8 @@ impl Store {
         done.map(|_| ()).map_err(|error| self.failed(error))
     }
 
-    /// The run of a cell has ended in order: what touched its robot and latched nothing is over, as far as anybody will
-    /// know.
+    /// Closes the open contacts without a latch of a cell whose run has ended normally, because their end will not be
+    /// reported.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -188,7 +188,8 @@ impl Store {
         done.map(|_| ()).map_err(|error| self.failed(error))
     }
 
-    /// Somebody has seen what is open at a cell. A change of the arm ends with that: nothing else tells its end.
+    /// Acknowledges the incidents of a cell. This also closes changes of the arm, whose end is not reported
+    /// otherwise.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -200,8 +201,8 @@ impl Store {
         done.map(|_| ()).map_err(|error| self.failed(error))
     }
 
-    /// The life of a cell's publisher whose latch nobody has acknowledged, and since when there is an incident of it
-    /// \[ns since the epoch\]; `None` where the newest contact is none that is latched.
+    /// Returns the publisher instance of a cell whose latch is not acknowledged, and the start of its incident \[ns
+    /// since the epoch\]; `None` if the newest contact is not latched.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -217,7 +218,7 @@ impl Store {
         found.map_err(|error| self.failed(error))
     }
 
-    /// Incidents of a cell, or of all: the open ones first, then the newest.
+    /// Returns the incidents of a cell, or of all cells: the open ones first, then the newest.
     ///
     /// # Errors
     /// If the file cannot be read.

@@ -1,48 +1,48 @@
-//! What users have written into a cell's archive from the page, and the contact that it is about.
+//! Labels that users have written into a cell's archive from the page, with the contacts to which they refer.
 
 use rusqlite::params;
 use serde::Serialize;
 
 use super::{Store, StoreError};
 
-/// A file of before has no labels; one with them is read by programs of before.
+/// Table of labels. It was added later: older files lack it, and older programs ignore it.
 pub(super) const TABLE: &str = "
     CREATE TABLE IF NOT EXISTS labels (
         id INTEGER PRIMARY KEY, cell TEXT NOT NULL, at_ns INTEGER NOT NULL, stamp_ns INTEGER NOT NULL,
         by TEXT NOT NULL, text TEXT NOT NULL, onset_ns INTEGER, incident INTEGER);
     CREATE INDEX IF NOT EXISTS labels_by_cell ON labels (cell, at_ns);
 ";
-/// A label is of the newest contact before it, unless that is longer ago \[ns\].
-/// Resolution: who looks into a contact does so within a day.
+/// Longest time from a contact to a label that refers to it \[ns\].
+/// Resolution: a contact is investigated within a day.
 const OF_CONTACT_NS: i64 = 86_400_000_000_000;
 
-/// What somebody has written into the archive.
+/// A text that a user has written into the archive.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Label {
-    /// When, by the clock of the fleet host \[ns since the epoch\].
+    /// Time by the clock of the fleet host \[ns since the epoch\].
     pub at_ns: i64,
     /// Stamp of the sample that carries it \[ns since the epoch\].
     pub stamp_ns: i64,
-    /// Who.
+    /// The user.
     pub by: String,
-    /// What.
+    /// The text.
     pub text: String,
 }
 
-/// A label, and what it is about.
+/// A stored label, with the contact and the incident to which it refers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct KeptLabel {
     /// The label.
     #[serde(flatten)]
     pub label: Label,
-    /// Onset of the contact that it is about; `None` where there was none \[ns since the epoch\].
+    /// Onset of the contact; `None` without one \[ns since the epoch\].
     pub onset_ns: Option<i64>,
-    /// The incident that it is about.
+    /// Number of the incident; `None` without one.
     pub incident: Option<i64>,
 }
 
 impl Store {
-    /// Keeps a label that a cell has taken, with its newest contact and the incident of that.
+    /// Stores a label that a cell has accepted, with the cell's newest contact and the incident of that.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -67,7 +67,7 @@ impl Store {
         done.map(|_| ()).map_err(|error| self.failed(error))
     }
 
-    /// The newest labels of a cell, or of all.
+    /// Returns the newest labels of a cell, or of all cells.
     ///
     /// # Errors
     /// If the file cannot be read.

@@ -1,31 +1,31 @@
-//! What people note of a cell.
+//! Maintenance notes on cells.
 
 use rusqlite::params;
 use serde::Serialize;
 
 use super::{Store, StoreError};
 
-/// What somebody noted of a cell.
+/// A maintenance note on a cell.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Note {
-    /// When \[ns since the epoch\].
+    /// Time \[ns since the epoch\].
     pub at_ns: i64,
-    /// Who.
+    /// The user.
     pub by: String,
-    /// What.
+    /// The text.
     pub text: String,
-    /// Whether the cell's normal is learned anew from here on.
+    /// Whether the normal residual of the cell is learned again from here on.
     pub baseline: bool,
 }
 
-/// When notes begin a new baseline \[days since 1970-01-01 UTC\].
+/// Returns the times of the notes that begin a new baseline \[days since 1970-01-01 UTC\].
 pub fn baselines(notes: &[Note]) -> Vec<f64> {
     let begins = notes.iter().filter(|note| note.baseline);
     begins.map(|note| note.at_ns as f64 / 86_400e9).collect()
 }
 
 impl Store {
-    /// Keeps a note.
+    /// Stores a note.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -37,7 +37,7 @@ impl Store {
         done.map(|_| ()).map_err(|error| self.failed(error))
     }
 
-    /// The newest notes of a cell.
+    /// Returns the newest notes of a cell.
     ///
     /// # Errors
     /// If the file cannot be read.

@@ -54,7 +54,7 @@ fn a_cause_that_is_told_with_a_stamp_of_long_before_its_end_is_another_incident(
     store.raise(&news("link5", 600, Severity::Notice)).unwrap();
     store.close("a", Kind::Contact, "link5", 601 * MIN).unwrap();
     store.raise(&news("link5", 60, Severity::Notice)).unwrap();
-    // The open one is gone on with, whatever its stamps.
+    // The open incident is continued, whatever its stamps.
     store.raise(&news("link5", 61, Severity::Notice)).unwrap();
     let all = store.incidents(None, 10).unwrap();
     let counts: Vec<_> = all.iter().map(|one| (one.count, one.reopened)).collect();
@@ -88,10 +88,10 @@ fn a_contact_is_kept_once_with_all_that_becomes_known_of_it() {
     contact.end_ns = Some(6_000_000_000);
     contact.acknowledged_by = Some("anna".to_owned());
     assert_eq!(keep(&contact), Said::More);
-    // What is told again says nothing, and takes nothing back.
+    // A repeated message adds nothing, and takes nothing back.
     assert_eq!(keep(&contact), Said::Nothing);
     assert_eq!(keep(&begun), Said::Nothing);
-    // Of another life it is another one.
+    // Of another publisher instance it is another contact.
     let other = fixture::contact(1, 9);
     let said = store.contact("a", "y", &other, "pc", Some("a.mcap"), 0);
     assert_eq!(said.unwrap(), Said::New);
@@ -203,7 +203,7 @@ fn a_label_is_kept_with_the_contact_and_the_incident_that_it_is_about() {
     store
         .label("b", &label(3 * MIN, "of another cell"))
         .unwrap();
-    // What comes later takes no label over.
+    // A later contact does not take over a label.
     let later = fixture::contact(2, 600);
     store.contact("a", "x", &later, "pc", None, 0).unwrap();
     let kept = store.labels(Some("a"), 10).unwrap();
@@ -257,7 +257,7 @@ fn a_latch_is_known_until_it_is_acknowledged() {
     contact.acknowledged_ns = Some(2 * MIN);
     store.contact("a", "x", &contact, "pc", None, 0).unwrap();
     assert_eq!(store.latched("a").unwrap(), None);
-    // A contact behind it that is not latched.
+    // A later contact that is not latched.
     store
         .contact("a", "x", &fixture::contact(2, 120), "pc", None, 0)
         .unwrap();

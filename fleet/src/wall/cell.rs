@@ -1,4 +1,4 @@
-//! What is known of one cell.
+//! State of one cell.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -11,54 +11,54 @@ use super::snapshot::{CellView, ResidualView};
 use super::state::{Severity, StaleWhy, State, UnknownWhy};
 use super::{CLOCK_LIMIT_NS, Effect, Now, PARTING_MS, STALE_AFTER_MS};
 
-/// Lives of one cell that are followed at a time. Resolution: one is right, two are a fault; a stranger may not fill
-/// the memory.
+/// Maximum number of publisher instances tracked for a cell.
+/// Resolution: one is right, two are a fault; an unknown publisher must not fill the memory.
 const MAX_LIVES: usize = 8;
-/// Minutes of the residual that are kept. Resolution: an hour on the small curve of a tile.
+/// Number of minutes of the residual that are kept. Resolution: an hour on the small curve of a tile.
 const MINUTES: usize = 60;
 const NS_PER_MS: i64 = 1_000_000;
 
-/// A cell of an earlier life of the fleet host.
+/// A cell of an earlier run of the fleet host.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Remembered {
     /// Its name.
     pub cell: String,
-    /// When it was seen last \[ns since the epoch\].
+    /// Time when it was last seen \[ns since the epoch\].
     pub seen_ns: i64,
-    /// When its run ended in order, if that was the last that was heard of it \[ns since the epoch\].
+    /// Time of the normal end of its run, if nothing was received after that \[ns since the epoch\].
     pub ended_ns: Option<i64>,
 }
 
-/// A cell.
+/// A monitored cell.
 #[derive(Debug, Default)]
 pub struct Watched {
     /// Whether it was named at the start.
     pub expected: bool,
-    /// What is known of an earlier life of the fleet host.
+    /// State from an earlier run of the fleet host.
     remembered: Option<Remembered>,
-    /// Those whose tokens are there.
+    /// Publisher instances with a token.
     lives: BTreeSet<String>,
-    /// Those that have told a status: one more than [`MAX_LIVES`] at most.
+    /// Publisher instances that have sent a status; at most one more than [`MAX_LIVES`].
     heard: BTreeMap<String, Life>,
-    /// When its last token went.
+    /// Time when its last token was lost.
     gone: Option<Now>,
     status: Option<(StatusMessage, Now)>,
     latch: Latch,
     minutes: VecDeque<f64>,
     minute: Option<i64>,
-    /// The state as of the last settling, and since when, if this host saw it begin \[ns since the epoch\].
+    /// The state at the last update, and its start if this host observed it \[ns since the epoch\].
     settled: Option<(State, Option<i64>)>,
 }
 
 impl Watched {
-    /// What is known of an earlier life of the fleet host; a life of its publisher was latched since then
-    /// \[ns since the epoch\].
+    /// Restores the state from an earlier run of the fleet host. `latched`: the publisher instance that was latched,
+    /// and the start of the latch \[ns since the epoch\].
     pub fn remember(&mut self, known: Remembered, latched: Option<(String, i64)>) {
         self.remembered = Some(known);
         self.latch.remember(latched);
     }
 
-    /// A token is there; `false` where it is one too many.
+    /// Adds a token. Returns `false` if there are too many.
     pub fn alive(&mut self, instance: String) -> bool {
         if self.lives.len() >= MAX_LIVES && !self.lives.contains(&instance) {
             return false;
@@ -68,25 +68,25 @@ impl Watched {
         true
     }
 
-    /// Whether it lives and nothing is known of that life.
+    /// Returns whether it is connected and the status of that publisher instance is unknown.
     pub fn awaits_status(&self) -> bool {
         let known = self.newest().map(|status| &status.instance);
         known.is_none_or(|known| !self.lives.contains(known))
     }
 
-    /// A token is gone.
+    /// Removes a token.
     pub fn gone(&mut self, instance: &str, now: Now) {
         if self.lives.remove(instance) && self.lives.is_empty() {
             self.gone = Some(now);
         }
     }
 
-    /// The newest status.
+    /// Returns the newest status.
     pub fn newest(&self) -> Option<&StatusMessage> {
         self.status.as_ref().map(|(status, _)| status)
     }
 
-    /// Takes a status that the cell was asked for. What it has said meanwhile by itself is newer.
+    /// Processes the answer to a status query. A periodic status that arrived meanwhile is newer.
     pub fn answer(
         &mut self,
         name: &str,
@@ -100,7 +100,8 @@ impl Watched {
         }
     }
 
-    /// Takes a status. They come as they were sent, so stamps do not matter: the cell's clock may have been set back.
+    /// Processes a status. Statuses arrive in the order of sending, so stamps are ignored: the cell's clock may have
+    /// been set back.
     pub fn status(
         &mut self,
         name: &str,
@@ -112,7 +113,7 @@ impl Watched {
         let is_ours = |life: &String| lives.contains(life);
         let known = self.newest().map(|known| &known.instance);
         let is_same = known.is_some_and(|known| *known == status.instance);
-        // Another publisher speaks: the one whose token is there is right.
+        // Another publisher sends: the one with a token takes precedence.
         if !is_same && known.is_some_and(is_ours) && !is_ours(&status.instance) {
             return;
         }
@@ -127,7 +128,7 @@ impl Watched {
         self.status = Some((status, now));
     }
 
-    /// One value a minute, for the curve.
+    /// Stores one value per minute, for the curve.
     fn note_residual(&mut self, status: &StatusMessage) {
         let Some(residual) = &status.residual else {
             return;
@@ -144,13 +145,13 @@ impl Watched {
         }
     }
 
-    /// Takes a record.
+    /// Processes a record.
     pub fn record(&mut self, name: &str, message: RecordMessage, effects: &mut Vec<Effect>) {
         if self.status.is_some() && !self.speaks(&message.instance) {
-            // Of a life that is over, or about to begin: its status comes first.
+            // The instance has ended, or has not sent its first status yet.
             return;
         }
-        // With a hole before it, the status that follows makes somebody ask.
+        // After a gap, the next status causes a query for the missing records.
         if let Some(life) = self.heard.get_mut(&message.instance)
             && message.number == life.records.saturating_add(1)
         {
@@ -165,21 +166,21 @@ impl Watched {
         });
     }
 
-    /// Whether a life has told a status, and it is the newest or its token is there.
+    /// Returns whether an instance has sent a status, and is the newest one or has a token.
     fn speaks(&self, instance: &str) -> bool {
         let known = self.newest();
         let is_newest = known.is_some_and(|status| status.instance == instance);
         is_newest || (self.lives.contains(instance) && self.heard.contains_key(instance))
     }
 
-    /// What its clock says.
+    /// Processes a measurement of its clock.
     pub fn clock(&mut self, instance: &str, offset: Offset, now: Now) {
         if let Some(life) = self.heard.get_mut(instance) {
             life.clock.note(offset, now.running_ms);
         }
     }
 
-    /// What is kept of the records has come; what is older is gone.
+    /// Marks the records up to `number` as received: all that the cell keeps have arrived, older ones are lost.
     pub fn all_records(&mut self, instance: &str, number: u64) {
         if !self.speaks(instance) {
             return;
@@ -189,7 +190,7 @@ impl Watched {
         }
     }
 
-    /// Where it stands.
+    /// Returns its state.
     pub fn state(&self, reached: usize, now: Now) -> State {
         let Some((status, at)) = &self.status else {
             return self.state_without_status();
@@ -204,11 +205,11 @@ impl Watched {
         if reached == 0 && (self.gone.is_some() || age_ms > STALE_AFTER_MS) {
             return stale(at.unix_ns, StaleWhy::Connection);
         }
-        // The last status of a run that ends in order comes with the end of its token, sooner or later.
+        // The last status of a run that ends normally may arrive shortly after the loss of its token.
         let parts = |gone: &Now| now.running_ms.saturating_sub(gone.running_ms) < PARTING_MS;
         let is_parting = self.gone.as_ref().is_some_and(parts);
         if let Some(gone) = self.gone.filter(|_| !is_parting) {
-            // One that has long been silent is not fresher because the network has noticed that, too.
+            // A cell that was silent before the loss of its token is stale since its last status.
             let silent_ms = gone.running_ms.saturating_sub(at.running_ms);
             let was_silent = silent_ms > STALE_AFTER_MS;
             let since = if was_silent { *at } else { gone };
@@ -239,7 +240,7 @@ impl Watched {
                 acknowledged: false,
             },
             AlarmState::Acknowledged => State::Stopped { acknowledged: true },
-            // Samples come, and no detector has said anything of one yet.
+            // Samples arrive, but no detector has evaluated one yet.
             AlarmState::Silent if status.alarm.stamp_ns == 0 => State::NotReady,
             AlarmState::Silent => {
                 let age_ns = status
@@ -274,7 +275,7 @@ impl Watched {
         }
     }
 
-    /// Whether it was lost before this life of the fleet host began.
+    /// Returns the report of a cell that was lost before this run of the fleet host, if it was.
     pub fn missing(&self, name: &str) -> Option<Effect> {
         let (now, _) = self.settled?;
         let is_missing = self.remembered.is_some() && self.status.is_none();
@@ -284,13 +285,13 @@ impl Watched {
         })
     }
 
-    /// Notes a change of the state.
+    /// Updates the stored state. Returns its change, if any.
     pub fn settle(&mut self, name: &str, reached: usize, now: Now) -> Option<Effect> {
         let state = self.state(reached, now);
         let before = self.settled.map(|(state, _)| state);
         let changed = before.is_none_or(|before| !before.same_as(state));
         if changed {
-            // What a cell was in before this host first heard of it has lasted nobody knows how long.
+            // The start of a state is unknown if it precedes the first message that this host received.
             let is_untold = |state| matches!(state, State::Unknown { .. } | State::NeverSeen);
             let began_unseen = before.is_none_or(is_untold) && !is_untold(state);
             self.settled = Some((state, (!began_unseen).then_some(now.unix_ns)));
@@ -303,7 +304,7 @@ impl Watched {
         })
     }
 
-    /// What is shown.
+    /// Returns the view of the cell in a snapshot.
     pub fn view(&self, name: &str, reached: usize, now: Now) -> CellView {
         let state = self.state(reached, now);
         let since_ns = match state {

@@ -1,23 +1,23 @@
-//! Since when a cell is latched.
+//! Start time of a cell's latch.
 
 use tauscope_publish::message::{AlarmMessage, AlarmState};
 
 const NS_PER_MS: i64 = 1_000_000;
 
-/// A latched alarm, as long as nobody has told that it is released: a cell that is stale meanwhile is still latched.
+/// A latched alarm, until its release is reported: a stale cell is still latched.
 #[derive(Debug, Default)]
 pub struct Latch {
-    /// Since when \[ns since the epoch\].
+    /// Start of the latch \[ns since the epoch\].
     since_ns: Option<i64>,
-    /// The publisher's life that told so.
+    /// The publisher instance that reported it.
     instance: String,
-    /// Since when it was latched in an earlier life of the publisher, which does not know that any more.
+    /// Start of the latch in an earlier publisher instance, which the new one does not know \[ns since the epoch\].
     before_ns: Option<i64>,
 }
 
 impl Latch {
-    /// What is known from an earlier life of the fleet host: the publisher's life that was latched, and since when
-    /// \[ns since the epoch\].
+    /// Restores the latch from an earlier run of the fleet host: the publisher instance that was latched, and the
+    /// start of the latch \[ns since the epoch\].
     pub fn remember(&mut self, latched: Option<(String, i64)>) {
         let Some((instance, since_ns)) = latched else {
             return;
@@ -29,18 +29,18 @@ impl Latch {
         };
     }
 
-    /// Since when it is latched \[ns since the epoch\].
+    /// Returns the start of the latch \[ns since the epoch\].
     pub fn since_ns(&self) -> Option<i64> {
         self.since_ns
     }
 
-    /// Takes what the publisher's life `instance` tells of its alarm.
+    /// Processes the alarm that the publisher instance `instance` reports.
     pub fn take(&mut self, alarm: &AlarmMessage, instance: &str, now_ns: i64) {
         let is_latched = matches!(
             alarm.state,
             AlarmState::Collision | AlarmState::Acknowledged
         );
-        // A publisher that is silent may be one that does not tell how old a latch is.
+        // A silent publisher may be of a version that does not report the age of a latch.
         let is_known = alarm.state != AlarmState::Silent;
         match alarm.latched_for_ms {
             None if !is_latched && is_known => *self = Self::default(),

@@ -1,4 +1,4 @@
-//! What one life of a cell's publisher has told so far.
+//! State of one publisher instance of a cell.
 
 use std::collections::BTreeMap;
 
@@ -7,25 +7,28 @@ use tauscope_publish::message::StatusMessage;
 
 use super::{Effect, Now};
 
-/// How often a cell is asked for its clock \[ms\], and how often until it was so many times.
-/// Resolution: traffic, against how soon a clock that was set is told of; a first burst as of NTP.
+/// Interval between clock queries to a cell \[ms\].
+/// Resolution: traffic, against the delay until a change of the clock is reported.
 const CLOCK_EVERY_MS: u64 = 10_000;
+/// Interval between the first clock queries \[ms\], and the number of measurements until then.
+/// Resolution: a first burst as in NTP.
 const CLOCK_BURST: (u64, usize) = (900, 4);
 
-/// A life of a publisher. Two that speak at a time are not taken for one that begins with each status.
+/// A publisher instance. Two that send at a time are tracked separately, so that their statuses do not look like
+/// restarts.
 #[derive(Debug, Default)]
 pub struct Life {
-    /// The last number of a record.
+    /// Number of the last record.
     pub records: u64,
-    /// Lost samples by stage, as last told; `None` before the first status.
+    /// Lost samples by stage, as last reported; `None` before the first status.
     lost: Option<BTreeMap<String, u64>>,
     pub clock: ClockFilter,
-    /// When it was asked for its clock \[ms\].
+    /// Time of the last clock query \[ms\].
     clock_asked: Option<u64>,
 }
 
 impl Life {
-    /// Takes a status of the cell `name`.
+    /// Processes a status of the cell `name`.
     pub fn take(
         &mut self,
         name: &str,
@@ -56,10 +59,10 @@ impl Life {
         let stages = status.stages.iter();
         let told = stages.map(|stage| (stage.stage.clone(), stage.dropped));
         let told: BTreeMap<String, u64> = told.collect();
-        // What was lost before this host first heard of the life was told then, or nobody knows when it was.
+        // Losses before the first status were reported earlier, or their time is unknown.
         if let Some(known) = &self.lost {
             for (stage, dropped) in &told {
-                // A stage that was started again counts from 0.
+                // A restarted stage counts from 0.
                 let samples = dropped.saturating_sub(known.get(stage).copied().unwrap_or(0));
                 if samples > 0 {
                     effects.push(Effect::Lost {
@@ -73,7 +76,7 @@ impl Life {
         self.lost = Some(told);
     }
 
-    /// Samples that its stages have lost.
+    /// Returns the number of samples that its stages have lost.
     pub fn lost_samples(&self) -> u64 {
         let lost = self.lost.iter().flat_map(BTreeMap::values);
         lost.fold(0, |sum, lost| sum.saturating_add(*lost))

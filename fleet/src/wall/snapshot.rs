@@ -12,22 +12,22 @@ use crate::physics::Drift;
 /// All cells at one instant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Snapshot {
-    /// When, by the clock of the fleet host \[ns since the epoch\].
+    /// Time by the clock of the fleet host \[ns since the epoch\].
     pub now_ns: i64,
-    /// Zenoh sessions that the fleet host reaches; with 0 nothing here is fresh.
+    /// Number of connected Zenoh sessions; with 0 nothing here is fresh.
     pub sessions_reached: usize,
-    /// How many cells there are in each state.
+    /// Number of cells in each state.
     pub totals: Totals,
-    /// Messages that were refused, by reason.
+    /// Number of rejected messages by reason.
     pub refused: BTreeMap<&'static str, u64>,
-    /// Why incidents and history are not kept now; `None` where they are, or are not to be.
+    /// Reason why incidents and history are not stored now; `None` if they are, or if there is no store.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unkept: Option<String>,
-    /// The worst first; of equals the one that is so for longest.
+    /// The cells, the most severe first; among equals the one that is in its state for longest.
     pub cells: Vec<CellView>,
 }
 
-/// How many cells are in each state, by its name.
+/// Number of cells in each state, by the name of the state.
 pub type Totals = BTreeMap<&'static str, usize>;
 
 /// One cell at one instant.
@@ -35,64 +35,64 @@ pub type Totals = BTreeMap<&'static str, usize>;
 pub struct CellView {
     /// The cell.
     pub cell: String,
-    /// Where it stands.
+    /// Its state.
     #[serde(flatten)]
     pub state: State,
-    /// How much that matters: a cell that is latched is critical, whatever else it is.
+    /// Its severity; a latched cell is critical in any state.
     pub severity: Severity,
-    /// Since when it is in that state; `None` where it was before this host first heard of it \[ns since the epoch\].
+    /// Start of that state; `None` if it precedes the first message that this host received \[ns since the epoch\].
     #[serde(rename = "state_since_ns")]
     pub since_ns: Option<i64>,
-    /// Since when a collision is latched, also while the cell is stale; `None` where nothing is \[ns since the epoch\].
+    /// Start of a latched collision, also while the cell is stale; `None` without a latch \[ns since the epoch\].
     pub latched_since_ns: Option<i64>,
     /// Time since the newest status arrived \[ms\].
     pub status_age_ms: Option<u64>,
     /// Time since the newest sample arrived in the cell \[ms\].
     pub sample_age_ms: Option<u64>,
-    /// How far the cell's clock is ahead of the fleet host's \[ms\].
+    /// Offset of the cell's clock from the fleet host's, positive if ahead \[ms\].
     pub clock_ahead_ms: Option<f64>,
-    /// The truth is no farther away from that \[ms\].
+    /// Bound on the error of that offset \[ms\].
     pub clock_uncertainty_ms: Option<f64>,
-    /// Whether the clocks differ by more than [`CLOCK_LIMIT_NS`](super::CLOCK_LIMIT_NS) for certain.
+    /// Whether the clocks certainly differ by more than [`CLOCK_LIMIT_NS`](super::CLOCK_LIMIT_NS).
     pub clock_is_off: bool,
-    /// Samples that its stages have lost.
+    /// Number of samples that its stages have lost.
     pub lost_samples: u64,
-    /// Its residual against its normal.
+    /// Its residual relative to its normal residual.
     pub residual: Option<ResidualView>,
-    /// The residual's length in each of the last minutes \[effort unit\].
+    /// Norm of the residual in each of the last minutes \[effort unit\].
     pub curve: Vec<f64>,
-    /// The residual's length by day over the last six weeks, as a share of the normal; empty without a history.
+    /// Norm of the residual by day over the last six weeks, relative to the normal one; empty without a history.
     pub trend: Vec<f64>,
-    /// The joint whose friction has changed most over weeks; `None` where no nightly numbers are followed.
+    /// The joint whose friction has changed most over weeks; `None` without nightly tables.
     pub drift: Option<Drift>,
-    /// Whether more cells with a robot of this name have another URDF, which they share.
+    /// Whether another URDF is more common among the cells with a robot of this name.
     pub urdf_differs: bool,
-    /// What it said last; as old as `status_age_ms`.
+    /// The newest status, with the age `status_age_ms`.
     pub status: Option<StatusMessage>,
 }
 
-/// A cell's residual against its normal.
+/// A cell's residual relative to its normal residual.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResidualView {
-    /// Root mean square over all joints, over the same of the normal.
+    /// Ratio of the root mean squares over all joints.
     pub ratio: f64,
-    /// The joint whose residual grew most.
+    /// The joint with the largest ratio.
     pub joint: String,
-    /// By how much.
+    /// Ratio of that joint.
     pub joint_ratio: f64,
-    /// What is taken for normal: `calibration`, or `history` since the newest baseline.
+    /// Source of the normal residual: `calibration`, or `history` since the newest baseline.
     pub normal: &'static str,
 }
 
 impl CellView {
-    /// Since when it is latched, where its state does not say so \[ns since the epoch\].
+    /// Returns the start of a latch that its state does not show \[ns since the epoch\].
     pub fn latched_behind(&self) -> Option<i64> {
         let is_said = matches!(self.state, State::Stopped { .. });
         self.latched_since_ns.filter(|_| !is_said)
     }
 
-    /// Until when alarms of a latched cell cause no further stop, where its state does not say so; `None` where they do
-    /// \[ns since the epoch\].
+    /// Returns the end of the mute of a latched cell, which its state does not show; `None` without a mute \[ns since
+    /// the epoch\].
     pub fn muted_behind(&self, now_ns: i64) -> Option<i64> {
         let is_latched = matches!(self.state, State::Stopped { .. });
         let muted_s = self.status.as_ref().filter(|_| is_latched)?.alarm.muted_s;
@@ -100,8 +100,8 @@ impl CellView {
         (left_ms > 0).then(|| now_ns.saturating_add(left_ms.saturating_mul(1_000_000)))
     }
 
-    /// Now, by the clock of the cell's samples: ages of what has a stamp are against this \[ns since the epoch\].
-    /// A recording that is played has another time than the fleet host.
+    /// Returns the current time by the clock of the cell's samples, to which ages of stamps refer \[ns since the
+    /// epoch\]. A recording that is played has another time than the fleet host.
     pub fn stream_now_ns(&self) -> Option<i64> {
         let newest_ns = self.status.as_ref()?.last_sample_ns?;
         let age_ns = self.sample_age_ms?.saturating_mul(1_000_000);
@@ -110,7 +110,7 @@ impl CellView {
 }
 
 impl ResidualView {
-    /// Against the twin's calibration.
+    /// Compares with the twin's calibration.
     pub fn of(status: &StatusMessage) -> Option<Self> {
         let joints = &status.residual.as_ref()?.joints;
         let known = joints.iter();
@@ -119,7 +119,7 @@ impl ResidualView {
         Self::against(known, "calibration")
     }
 
-    /// Against a normal: joint, residual, normal \[effort unit\].
+    /// Compares with a normal residual. `joints`: joint, residual, normal residual \[effort unit\].
     pub fn against<'a>(
         joints: impl Iterator<Item = (&'a str, f64, f64)>,
         normal: &'static str,
@@ -144,7 +144,7 @@ impl ResidualView {
     }
 }
 
-/// Marks the cells whose URDF is not the one that most cells with a robot of that name have.
+/// Marks the cells whose URDF is not the most common one among the cells with a robot of that name.
 fn mark_other_urdfs(cells: &mut [CellView]) {
     let own = |cell: &CellView| {
         let status = cell.status.as_ref()?;
@@ -163,7 +163,7 @@ fn mark_other_urdfs(cells: &mut [CellView]) {
     }
 }
 
-/// A name as people sort it, `press-2` before `press-10`: its words, with the number behind each.
+/// Returns the key of a natural sort, `press-2` before `press-10`: the words of a name, with the number after each.
 fn natural(name: &str) -> Vec<(&str, u64, usize)> {
     let mut parts = Vec::new();
     let mut rest = name;
@@ -190,7 +190,7 @@ impl Snapshot {
         refused: BTreeMap<&'static str, u64>,
         mut cells: Vec<CellView>,
     ) -> Self {
-        // Names keep equals in their places, so that the wall does not flicker.
+        // Equals are sorted by name, so that the wall does not flicker.
         cells.sort_by(|a, b| {
             let key = |cell: &CellView| {
                 let good = cell.severity == Severity::Good;
@@ -216,7 +216,7 @@ impl Snapshot {
         }
     }
 
-    /// The view of a cell.
+    /// Returns the view of a cell.
     pub fn cell(&self, name: &str) -> Option<&CellView> {
         self.cells.iter().find(|cell| cell.cell == name)
     }

@@ -1,90 +1,90 @@
-//! The states of a cell, in words and by how much they matter.
+//! The states of a cell, with their descriptions and severities.
 
 use serde::Serialize;
 
-/// How a cell stands. There is one that is good, and it must be earned.
+/// State of a cell. Only [`State::Running`] is good, and all of its conditions must hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(tag = "state", rename_all = "snake_case")]
 pub enum State {
-    /// Somebody has to look: the alarm is latched.
+    /// A latched alarm, which a person has to check.
     Stopped {
-        /// Whether somebody has acknowledged it; then it ends with the contact.
+        /// Whether it is acknowledged; it then ends with the contact.
         acknowledged: bool,
     },
-    /// What is known is too old to hold.
+    /// Data that are too old.
     Stale {
-        /// Since when \[ns since the epoch\].
+        /// Start time \[ns since the epoch\].
         since_ns: i64,
-        /// What is missing.
+        /// The missing data.
         why: StaleWhy,
     },
-    /// Nothing certain is known.
+    /// An unknown state.
     Unknown {
-        /// Why.
+        /// Reason.
         why: UnknownWhy,
     },
-    /// Something touches the robot, or its detector calls it so.
+    /// A contact with the robot, according to a detector.
     Contact,
-    /// A detector cannot judge yet.
+    /// A detector that is not ready.
     NotReady,
-    /// It is expected, but was not there since the fleet host started.
+    /// An expected cell that has not connected since the fleet host started.
     NeverSeen,
-    /// Alarms cause no stop.
+    /// Alarms that cause no stop.
     Muted {
-        /// Until when, by the clock of the fleet host \[ns since the epoch\].
+        /// End time by the clock of the fleet host \[ns since the epoch\].
         until_ns: i64,
     },
-    /// The run has ended in order.
+    /// A run that ended normally.
     Ended {
-        /// Since when \[ns since the epoch\].
+        /// End time \[ns since the epoch\].
         since_ns: i64,
     },
-    /// Samples come, all detectors judge, nothing touches the robot.
+    /// Samples arrive, all detectors are ready, and there is no contact.
     Running,
 }
 
-/// What is missing of a stale cell.
+/// Missing data of a stale cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StaleWhy {
-    /// Its token: the process has ended, or its host is cut off.
+    /// Its token: the process has ended, or its host is disconnected.
     Token,
-    /// Its status: the process hangs, or its host is cut off.
+    /// Its status: the process is hung, or its host is disconnected.
     Status,
-    /// Samples: the publisher lives, but its detectors say nothing.
+    /// Samples: the publisher is connected, but its detectors are silent.
     Samples,
-    /// The fleet host itself reaches nobody.
+    /// All data: the fleet host itself is disconnected.
     Connection,
 }
 
-/// Why nothing certain is known.
+/// Reason for an unknown state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UnknownWhy {
-    /// It lives, but has told no status yet.
+    /// The cell is connected, but has not sent a status yet.
     NoStatus,
-    /// It tells a status, but its publisher's token is not there.
+    /// The cell sends a status, but its publisher has no token.
     NoToken,
-    /// Two publishers call themselves by this name.
+    /// Two publishers use this name.
     TwoPublishers,
 }
 
-/// How much a state matters.
+/// Severity of a state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
-    /// Somebody has to go there.
+    /// A person has to go to the robot.
     Critical,
-    /// Nobody watches the robot.
+    /// The robot is not monitored.
     Serious,
-    /// It will pass, or is meant.
+    /// A temporary or intended state.
     Notice,
-    /// All is well.
+    /// Normal operation.
     Good,
 }
 
 impl State {
-    /// How much it matters.
+    /// Returns its severity.
     pub fn severity(self) -> Severity {
         match self {
             Self::Stopped { .. } => Severity::Critical,
@@ -96,7 +96,7 @@ impl State {
         }
     }
 
-    /// Its name, one word: the same in JSON, metrics and the page.
+    /// Returns its name, the same word in JSON, metrics and the page.
     pub fn name(self) -> &'static str {
         match self {
             Self::Stopped { .. } => "stopped",
@@ -124,7 +124,7 @@ impl State {
         "running",
     ];
 
-    /// For people, without times.
+    /// Returns its description for people, without times.
     pub fn words(self) -> &'static str {
         match self {
             Self::Stopped {
@@ -142,7 +142,7 @@ impl State {
         }
     }
 
-    /// Why, and what to look at; empty where the state says it all.
+    /// Returns the reason and what to check; empty if the state needs no explanation.
     pub fn reason(self) -> &'static str {
         match self {
             Self::Stopped {
@@ -164,14 +164,14 @@ impl State {
             Self::NotReady => "a detector cannot judge yet",
             Self::NeverSeen => "expected, but not there since the fleet host started",
             Self::Muted { .. } => "alarms cause no stop",
-            Self::Ended { .. } => "the run has ended in order",
+            Self::Ended { .. } => "the run has ended normally",
             Self::Running => "",
         }
     }
 }
 
 impl State {
-    /// Whether it is the same state, whatever its times.
+    /// Returns whether it is the same state, whatever its times.
     pub fn same_as(self, other: Self) -> bool {
         let why = |state: Self| match state {
             Self::Stale { why, .. } => Some(why),

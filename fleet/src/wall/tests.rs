@@ -1,4 +1,4 @@
-//! What the wall says, as statements.
+//! Tests of the wall.
 
 use tauscope_publish::message::{AlarmState, StatusMessage};
 
@@ -196,7 +196,7 @@ fn a_clock_that_is_off_for_certain_is_told_of() {
     // A slow network leaves it open.
     assert_eq!(answer(&mut story, "x", 340, 300), (Some(340.0), false));
     assert_eq!(answer(&mut story, "x", 339, 2), (Some(339.0), true));
-    // Of another life nothing is taken.
+    // A measurement of another publisher instance is ignored.
     assert_eq!(answer(&mut story, "y", 0, 1), (Some(339.0), true));
     assert_eq!(answer(&mut story, "x", 1, 1), (Some(1.0), false));
     // It is asked again, in the beginning more often.
@@ -270,7 +270,7 @@ fn a_latch_is_as_old_as_it_is_whatever_the_fleet_host_has_missed() {
         latched(10)(status);
     });
     assert_eq!(shown(&story).since_ns, Some(since_ns));
-    // It is released, and latched anew.
+    // It is released, and latched again.
     story.wait(1_000);
     story.status(|status| status.instance = "y".to_owned());
     assert_eq!(shown(&story).latched_since_ns, None);
@@ -325,7 +325,7 @@ fn samples_that_are_lost_are_counted_over_restarts() {
         Effect::Lost { samples, .. } => Some(*samples),
         _ => None,
     });
-    // The first status of a life says what was lost before anybody listened.
+    // The first status of a publisher instance contains the losses before this host listened.
     assert_eq!(samples.collect::<Vec<_>>(), [7]);
     assert_eq!(story.wall.snapshot().cells[0].lost_samples, 10);
 }
@@ -414,7 +414,7 @@ fn a_cell_that_was_lost_while_this_host_was_down_is_told_of_once() {
     assert_eq!(missing(&story), 0);
     story.wait(1).wait(60_000).is("stale");
     assert_eq!(missing(&story), 1);
-    // One that has come back, and one whose run has ended in order.
+    // A cell that has come back, and one whose run has ended normally.
     let mut story = Story::new(&[]);
     story.wall.remember(remembered(5, None), None);
     story.wait(1).alive("x").status(|_| {}).wait(BACK_AFTER_MS);

@@ -1,4 +1,5 @@
-//! What users do: acknowledge, mute, label, note. Each answer leads back to the cell's page, which tells what came of it.
+//! Actions of users: acknowledge, mute, label, note. Each response redirects to the cell's page, which shows the
+//! result.
 
 use std::sync::Arc;
 
@@ -13,45 +14,46 @@ use crate::store::{Label, Note};
 use crate::wall::{State as CellState, UnknownWhy};
 use crate::words;
 
+/// Maximum length of a note \[bytes\].
 /// Resolution: a sentence or two.
 const MAX_NOTE_BYTES: usize = 400;
 
-/// A form with nothing but the session's secret.
+/// A form with only the session's secret.
 #[derive(Deserialize)]
 pub struct Bare {
-    /// Empty where there is none, as in what is no form of this page.
+    /// Empty if it is missing, as in a request that is not a form of this page.
     #[serde(default)]
     csrf: String,
 }
 
-/// A token.
+/// A form with a token.
 #[derive(Deserialize)]
 pub struct Login {
     #[serde(default)]
     token: String,
 }
 
-/// A lease.
+/// A form with the duration of a mute.
 #[derive(Deserialize)]
 pub struct Mute {
     #[serde(default)]
     csrf: String,
-    /// Nothing is muted for no time.
+    /// Duration \[s\]; a missing one is rejected.
     seconds: Option<f64>,
 }
 
-/// A label or a note.
+/// A form with a label or a note.
 #[derive(Deserialize)]
 pub struct Written {
     #[serde(default)]
     csrf: String,
     #[serde(default)]
     text: String,
-    /// `on`: the cell's normal is learned anew.
+    /// `on`: the normal residual of the cell is learned again.
     baseline: Option<String>,
 }
 
-/// Why nothing is done.
+/// Response to a rejected action.
 type Refused = (StatusCode, &'static str);
 
 pub async fn login(State(shared): App, headers: HeaderMap, Form(form): Form<Login>) -> Response {
@@ -189,7 +191,7 @@ async fn command(
     back(shared, headers, cell, told)
 }
 
-/// The user of the form, if the cell is known and the user does not flood it.
+/// Returns the user of the form, if the cell is known and the user is within the rate limit.
 fn may(shared: &Shared, headers: &HeaderMap, csrf: &str, cell: &str) -> Result<String, Refused> {
     let user = shared.sessions.of_form(headers, csrf);
     let user = user.ok_or((
@@ -206,7 +208,7 @@ fn may(shared: &Shared, headers: &HeaderMap, csrf: &str, cell: &str) -> Result<S
     Ok(user)
 }
 
-/// Whether the cell is there and its source takes commands.
+/// Returns whether the cell is connected and its source takes commands.
 fn hears(shared: &Shared, cell: &str) -> bool {
     let snapshot = shared.hub.snapshot();
     let Some(view) = snapshot.cell(cell) else {
@@ -220,13 +222,13 @@ fn hears(shared: &Shared, cell: &str) -> bool {
     takes && !is_gone
 }
 
-/// What is told of a command that was taken.
+/// Describes the result of an accepted command.
 fn holds_from(stamp_ns: i64) -> String {
     let at = words::time(stamp_ns);
     format!("the cell has taken it; it holds from {at} on")
 }
 
-/// Whether two cells go by this name.
+/// Returns whether two publishers use this cell name.
 fn is_doubled(shared: &Shared, cell: &str) -> bool {
     let two = CellState::Unknown {
         why: UnknownWhy::TwoPublishers,
@@ -235,7 +237,7 @@ fn is_doubled(shared: &Shared, cell: &str) -> bool {
     snapshot.cell(cell).is_some_and(|view| view.state == two)
 }
 
-/// Sends a command; the stamp from which it holds \[ns since the epoch\].
+/// Sends a command. Returns the stamp from which it takes effect \[ns since the epoch\].
 async fn send(
     shared: &Arc<Shared>,
     cell: &str,

@@ -1,4 +1,4 @@
-//! The wall as server-sent events: at first all tiles, then those that have changed.
+//! The wall as server-sent events: first all tiles, then those that have changed.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -16,12 +16,12 @@ use tokio::sync::{OwnedSemaphorePermit, watch};
 use super::{App, Shared, pages};
 use crate::wall::Snapshot;
 
-/// How often a page is told. Resolution: ages are shown in seconds.
+/// Update interval of a page. Resolution: ages are shown in seconds.
 const EVERY: Duration = Duration::from_millis(500);
-/// However little happens, a page hears so often that it is still told. Resolution: it calls itself cut off after 5 s.
+/// Longest interval between events without a change. Resolution: a page reports itself as cut off after 5 s.
 const AT_LEAST: Duration = Duration::from_secs(2);
 
-/// What a page is told.
+/// Content of an event.
 #[derive(Debug, Serialize)]
 struct News {
     /// The line above the tiles, as HTML.
@@ -35,7 +35,7 @@ struct News {
 
 struct Follower {
     snapshots: watch::Receiver<Arc<Snapshot>>,
-    /// The cell of the page, where it is one cell's.
+    /// The cell of the page, if it shows a single cell.
     only: Option<String>,
     order: Vec<String>,
     tiles: BTreeMap<String, String>,
@@ -43,12 +43,12 @@ struct Follower {
     _place: OwnedSemaphorePermit,
 }
 
-/// All cells.
+/// Streams the events of all cells.
 pub async fn all(State(shared): App) -> Response {
     follow(&shared, None)
 }
 
-/// One cell.
+/// Streams the events of one cell.
 pub async fn one(State(shared): App, Path(cell): Path<String>) -> Response {
     follow(&shared, Some(cell))
 }

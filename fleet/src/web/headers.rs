@@ -1,4 +1,4 @@
-//! What every answer says to the browser, and which questions are none of ours.
+//! Security headers of every response, and rejection of requests from other sites.
 
 use std::str::FromStr;
 use std::sync::Arc;
@@ -11,11 +11,11 @@ use axum::response::{IntoResponse as _, Response};
 
 use super::Shared;
 
-/// Nothing but what this host itself serves; no script and no style within a page.
+/// Content security policy: only resources of this host; no inline script or style.
 const POLICY: &str = "default-src 'none'; style-src 'self'; script-src 'self'; connect-src 'self'; \
                       form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
 
-/// Refuses what comes from another site, and adds the headers.
+/// Rejects requests from another site, and adds the headers.
 pub async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
     let refused = (shared.door).refusal(request.method(), request.uri(), request.headers());
     let mut response = match refused {
@@ -38,12 +38,12 @@ pub async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Ne
     response
 }
 
-/// Which questions are taken.
+/// Filter of requests.
 #[derive(Debug)]
 pub struct Door {
     /// Whether only this computer reaches the page.
     pub is_loopback: bool,
-    /// By which the page is reached through proxies.
+    /// Origins under which proxies serve the page.
     pub origins: Vec<Origin>,
 }
 
@@ -58,7 +58,7 @@ impl Door {
         let host = text("host").or_else(|| uri.authority().map(Authority::as_str));
         let is_ours =
             |host: &str| is_loopback(host) || self.origins.iter().any(|one| one.has_host(host));
-        // A page of a stranger whose name was made to point here (DNS rebinding) has another host.
+        // A page of another site whose name was made to point here (DNS rebinding) has another host.
         if self.is_loopback && !host.is_some_and(is_ours) {
             return Some((
                 StatusCode::MISDIRECTED_REQUEST,
@@ -68,7 +68,7 @@ impl Door {
         if method == Method::GET || method == Method::HEAD {
             return None;
         }
-        // Browsers say where a form stood. Programs say nothing; they have no cookie that somebody else could use.
+        // Browsers send the origin of a form. Programs send none, and have no cookie that another site could use.
         let elsewhere =
             text("sec-fetch-site").is_some_and(|site| site != "same-origin" && site != "none");
         let origin = text("origin").is_some_and(|origin| {
@@ -83,15 +83,15 @@ impl Door {
     }
 }
 
-/// What stands before the path in the address of the page, where a proxy serves it: `https://fleet.plant`.
+/// Origin under which a proxy serves the page, its address without the path: `https://fleet.plant`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Origin {
     scheme: &'static str,
-    /// In small letters, with the port unless it is the scheme's own.
+    /// In lower case, with the port unless it is the default of the scheme.
     host: String,
 }
 
-/// It is no origin.
+/// A text that is not an origin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("an origin has a scheme, a name and maybe a port, such as https://fleet.plant")]
 pub struct NoOrigin;
@@ -150,7 +150,7 @@ mod tests {
         }
     }
 
-    /// What becomes of a form that a browser sends from `origin` to `host`.
+    /// Returns the status with which a form is rejected that a browser sends from `origin` to `host`.
     fn sent(door: &Door, host: &str, origin: &str) -> Option<u16> {
         let mut headers = HeaderMap::new();
         headers.insert("host", host.parse().unwrap());

@@ -1,4 +1,5 @@
-//! The wall for Prometheus, in the format `OpenMetrics`. Names have base units; `deploy/` has a board and rules for them.
+//! The wall for Prometheus, in the format `OpenMetrics`. Names have base units; `deploy/` has a dashboard and alert
+//! rules for them.
 
 use axum::extract::State as Extract;
 use axum::http::{StatusCode, header};
@@ -192,9 +193,9 @@ impl Families {
         registry.register_with_unit("status_age", help, seconds(), self.status_age);
         let help = "Time since the newest sample arrived in the cell";
         registry.register_with_unit("sample_age", help, seconds(), self.sample_age);
-        let help = "How far the cell's clock is ahead of the fleet host's";
+        let help = "Offset of the cell's clock from the fleet host's, positive if ahead";
         registry.register_with_unit("clock_ahead", help, seconds(), self.clock);
-        let help = "The truth is no farther away from the measured clock_ahead";
+        let help = "Bound on the error of the measured clock_ahead";
         registry.register_with_unit("clock_uncertainty", help, seconds(), self.clock_uncertainty);
         registry.register(
             "contacts_today",
@@ -205,7 +206,7 @@ impl Families {
         registry.register("lost_samples", help, self.lost);
         registry.register(
             "stage_restarts",
-            "How often the stage was started again",
+            "Number of restarts of the stage",
             self.restarts,
         );
         let help = "Root mean square of the residual over a minute, in the unit of the label";
@@ -247,7 +248,7 @@ mod tests {
             now,
         );
         let mut status = fixture::status("x", 5);
-        // What a stranger calls itself must not break a line.
+        // A name from an untrusted cell must not break a line.
         status.robot = "arm\"\\ {x}".to_owned();
         let status = Box::new(status);
         let clock = Event::Clock {

@@ -1,4 +1,4 @@
-//! The pages as HTML. Every value from outside is escaped by maud; no style and no script stands within a page.
+//! The pages as HTML. Every value from outside is escaped by maud; a page has no inline style or script.
 
 pub mod cell;
 mod chart;
@@ -9,23 +9,23 @@ pub mod wall;
 
 use maud::{DOCTYPE, Markup, html};
 
-/// Who looks at a page.
+/// Visitor of a page.
 #[derive(Debug, Clone)]
 pub struct Viewer {
     /// The user, if somebody is logged in.
     pub user: Option<String>,
     /// The secret of that user's forms.
     pub csrf: Option<String>,
-    /// What came of the last action.
+    /// Result of the last action.
     pub told: Option<String>,
     /// Whether anybody can log in.
     pub has_users: bool,
 }
 
-/// What this is not, on each page.
+/// Disclaimer on each page.
 const NOT_SAFETY: &str = "Not a safety function: what is shown here may be late, wrong or missing.";
 
-/// A page around its content. `live`: it follows the wall.
+/// Wraps the content in a page. `live`: the page follows the wall.
 fn layout(viewer: &Viewer, title: &str, live: bool, content: &Markup) -> Markup {
     html! {
         (DOCTYPE)
@@ -76,7 +76,7 @@ fn account(viewer: &Viewer) -> Markup {
     }
 }
 
-/// The page on which a user gives a token; `why` the last one was refused.
+/// Returns the page on which a user enters a token. `why`: the reason why the last one was rejected.
 pub fn login(viewer: &Viewer, why: Option<&str>) -> Markup {
     let content = html! {
         h1 { "Log in" }
@@ -95,7 +95,7 @@ pub fn login(viewer: &Viewer, why: Option<&str>) -> Markup {
     layout(viewer, "Log in", false, &content)
 }
 
-/// The page where there is nothing.
+/// Returns the page for a missing resource.
 pub fn not_found(viewer: &Viewer, why: &str) -> Markup {
     let content = html! {
         h1 { "Not here" }

@@ -1,7 +1,7 @@
-//! Who is logged in, and how much one may do.
+//! Sessions of users who are logged in, and their rate limits.
 //!
-//! A session is a cookie that scripts cannot read and other sites cannot send; each form holds a second secret of the
-//! session, so that a form of another site would be of no use even then.
+//! A session is a cookie that scripts cannot read and other sites cannot send. Each form also holds a second secret
+//! of the session, so that a form of another site would be useless even with the cookie.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -13,28 +13,28 @@ use subtle::ConstantTimeEq as _;
 use super::users::{UsersError, random_hex};
 
 const COOKIE: &str = "tauscope_session";
-/// Resolution: a shift and a half.
+/// Lifetime of a session. Resolution: a shift and a half.
 const LASTS: Duration = Duration::from_hours(12);
-/// Resolution: all people of a plant at two screens each.
+/// Maximum number of sessions. Resolution: all people of a plant at two screens each.
 const MAX_SESSIONS: usize = 1024;
-/// Actions at once, and how long one takes to be allowed again. Resolution: a person acknowledges ten cells in a row; a
-/// flood of commands must not starve a cell.
+/// Maximum number of actions at once. Resolution: a person acknowledges ten cells in a row.
 const BURST: u32 = 10;
+/// Time until one more action is allowed. Resolution: a flood of commands must not starve a cell.
 const AGAIN_AFTER: Duration = Duration::from_secs(2);
 
-/// Who is logged in.
+/// Session of a user who is logged in.
 #[derive(Debug, Clone)]
 pub struct Session {
     /// The user.
     pub user: String,
-    /// What each form of the user holds.
+    /// Secret in each form of the user.
     pub csrf: String,
-    /// What came of the last action; told once.
+    /// Result of the last action, shown once.
     pub told: Option<String>,
     until: Instant,
 }
 
-/// A bucket of permissions that fills up again.
+/// A token bucket.
 #[derive(Debug, Clone, Copy)]
 struct Bucket {
     left: f64,
@@ -61,7 +61,7 @@ impl Bucket {
 #[derive(Debug, Default)]
 struct State {
     sessions: BTreeMap<String, Session>,
-    /// By user; bounded, because users are.
+    /// Rate limits by user; bounded by the number of users.
     buckets: BTreeMap<String, Bucket>,
     logins: Option<Bucket>,
 }
@@ -71,7 +71,7 @@ struct State {
 pub struct Sessions(Mutex<State>);
 
 impl Sessions {
-    /// Begins a session and gives its cookie. `secure`: the browser came over TLS.
+    /// Begins a session and returns its cookie. `secure`: the browser connected over TLS.
     ///
     /// # Errors
     /// If the system has no random numbers.
@@ -103,7 +103,7 @@ impl Sessions {
         ))
     }
 
-    /// The session of a request; what is told once is told with it.
+    /// Returns the session of a request, and clears its result of the last action.
     pub fn of(&self, headers: &HeaderMap) -> Option<Session> {
         let id = id(headers)?;
         let mut state = self.lock();
@@ -117,7 +117,7 @@ impl Sessions {
         Some(given)
     }
 
-    /// The user of a form, if it is one that was given to that user's session.
+    /// Returns the user of a form, if the form belongs to that user's session.
     pub fn of_form(&self, headers: &HeaderMap, csrf: &str) -> Option<String> {
         let id = id(headers)?;
         let state = self.lock();
@@ -126,7 +126,7 @@ impl Sessions {
         (bool::from(same) && session.until > Instant::now()).then(|| session.user.clone())
     }
 
-    /// Tells the user something on the next page.
+    /// Sets a text that is shown to the user on the next page.
     pub fn tell(&self, headers: &HeaderMap, text: String) {
         let Some(id) = id(headers) else { return };
         if let Some(session) = self.lock().sessions.get_mut(&id) {
@@ -141,7 +141,7 @@ impl Sessions {
         }
     }
 
-    /// Whether a user may do one more thing now.
+    /// Returns whether a user may do one more action now.
     pub fn may_act(&self, user: &str) -> bool {
         let now = Instant::now();
         let mut state = self.lock();
@@ -149,7 +149,7 @@ impl Sessions {
         bucket.or_insert_with(|| Bucket::full(now)).take(now)
     }
 
-    /// Whether somebody may try a token now.
+    /// Returns whether a token may be tried now.
     pub fn may_try(&self) -> bool {
         let now = Instant::now();
         let mut state = self.lock();
@@ -159,7 +159,7 @@ impl Sessions {
             .take(now)
     }
 
-    // Each change is one step, so a panic elsewhere leaves nothing half done.
+    // Each change is a single step, so a poisoned lock is harmless.
     fn lock(&self) -> MutexGuard<'_, State> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

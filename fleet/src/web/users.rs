@@ -1,5 +1,5 @@
-//! Who may act: a file with a line for each user, `NAME HASH`. The hash is that of a random token of 256 bits, so it is
-//! of no use to who reads the file, and no slow hash is needed.
+//! Users who may act, from a file with a line `NAME HASH` for each. The hash is that of a random token of 256 bits,
+//! so it is useless to a reader of the file, and no slow hash is needed.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -11,23 +11,23 @@ use rand::rngs::OsRng;
 use sha2::{Digest as _, Sha256};
 use subtle::ConstantTimeEq as _;
 
-/// Names go with commands, which hold so many bytes.
+/// Maximum length of a name \[bytes\], equal to that in the commands that carry it.
 const MAX_NAME_BYTES: usize = 48;
-/// Resolution: a plant has fewer people at its robots.
+/// Maximum number of users. Resolution: a plant has fewer people at its robots.
 const MAX_USERS: usize = 1000;
 
-/// What is wrong with the users.
+/// An error of the users file.
 #[derive(Debug, thiserror::Error)]
 pub enum UsersError {
-    /// The file cannot be read or written.
+    /// A file that cannot be read or written.
     #[error("{path}: {source}")]
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The operating system's error.
         source: std::io::Error,
     },
-    /// A line is none.
+    /// A line that is not a user.
     #[error(
         "{path}:{line}: not a user; a line is a name, a space and the hash that `tauscope fleet --add-user` writes"
     )]
@@ -37,13 +37,13 @@ pub enum UsersError {
         /// The line, from 1.
         line: usize,
     },
-    /// Nobody is called so.
+    /// An invalid name.
     #[error("`{0}` cannot be a user's name: give 1 to 48 letters, digits, `.`, `-`, `_` or `@`")]
     Name(String),
-    /// There is one already.
+    /// A name that is already taken.
     #[error("there is a user `{0}` already; remove the line to give a new token")]
     Known(String),
-    /// The system has no random numbers.
+    /// A system without random numbers.
     #[error("no random numbers: {0}")]
     Random(String),
 }
@@ -54,25 +54,25 @@ pub struct Users {
     all: Vec<(String, [u8; 32])>,
 }
 
-/// A user who was just made.
+/// A newly added user.
 #[derive(Debug)]
 pub struct NewUser {
     /// The name.
     pub name: String,
-    /// The token, which is nowhere else.
+    /// The token, which is stored nowhere else.
     pub token: String,
 }
 
 impl Users {
-    /// Nobody.
+    /// Returns an empty set of users.
     pub fn none() -> Self {
         Self::default()
     }
 
-    /// The users in a file.
+    /// Reads the users in a file.
     ///
     /// # Errors
-    /// If it cannot be read, or a line is no user.
+    /// If it cannot be read, or a line is not a user.
     pub fn read(path: &Path) -> Result<Self, UsersError> {
         let text = std::fs::read_to_string(path).map_err(|source| UsersError::File {
             path: path.to_owned(),
@@ -95,10 +95,10 @@ impl Users {
         Ok(Self { all })
     }
 
-    /// Adds a user to a file, which is made if it is not there.
+    /// Adds a user to a file, and creates the file if necessary.
     ///
     /// # Errors
-    /// If the name is none or taken, or the file cannot be written.
+    /// If the name is invalid or taken, or the file cannot be written.
     pub fn add(path: &Path, name: &str) -> Result<NewUser, UsersError> {
         if !is_name(name) {
             return Err(UsersError::Name(name.to_owned()));
@@ -127,12 +127,12 @@ impl Users {
         Ok(NewUser { name, token })
     }
 
-    /// Whether there is nobody.
+    /// Returns whether there are no users.
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
     }
 
-    /// The user of a token. How long that takes does not tell how much of it is right.
+    /// Returns the user of a token. The comparison takes constant time.
     pub fn of(&self, token: &str) -> Option<&str> {
         let told = hash(token.trim());
         let mut found = None;
@@ -145,7 +145,7 @@ impl Users {
     }
 }
 
-/// 256 random bits in hexadecimal.
+/// Returns 256 random bits in hexadecimal.
 pub(super) fn random_hex() -> Result<String, UsersError> {
     let mut bytes = [0; 32];
     let filled = OsRng.try_fill_bytes(&mut bytes);

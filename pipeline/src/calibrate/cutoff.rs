@@ -1,24 +1,24 @@
-//! The low-pass on a joint's efforts that lets a contact through soonest and costs nothing: the fastest one behind which
-//! the peaks of the residual in contact-free motion are hardly larger than behind the usual one.
+//! Choice of the low-pass on a joint's efforts: the highest cutoff at which the peaks of the contact-free residual
+//! are hardly larger than at the default cutoff. It delays contacts least.
 //!
-//! What the residual leaves without contact is the twin's own error, which is slow, and the sensor's noise, which is
-//! not. Where the error is the larger, a slow low-pass delays contacts and removes next to nothing.
+//! The contact-free residual is the sum of the twin's error, which is slow, and sensor noise, which is fast. If the
+//! error dominates, a low cutoff delays contacts and removes almost nothing.
 
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
 use tauscope_dynamics::lowpass::Butterworth2;
 
-/// From one cutoff to the next that is tried.
+/// Ratio of successive candidate cutoffs.
 /// Tuned: half an octave; a finer step changes a delay by less than 5 ms.
 const STEP: f64 = std::f64::consts::SQRT_2;
-/// How many are tried: up to 11 times the usual one.
+/// Number of candidate cutoffs, up to 11 times the default.
 const TRIED: usize = 8;
-/// The peaks of the residual behind a faster low-pass may be larger by this factor: they make false alarms, not its RMS.
-/// Tuned: of 1.05, 1.1, 1.2, 1.3 on recordings after the three papers; docs/twin.md has what it does there.
+/// Accepted growth factor of the residual's peaks at a higher cutoff. False alarms depend on peaks, not on the RMS.
+/// Tuned: of 1.05, 1.1, 1.2, 1.3 on recordings after the three papers; docs/twin.md gives its effect there.
 const GROWTH: f64 = 1.1;
-/// The cutoff is at most this share of the sample rate, so that the filter still filters.
-/// Statistical: half the highest frequency that the samples can hold.
+/// Upper bound of the cutoff relative to the sample rate, above which the filter has too little effect.
+/// Statistical: half the Nyquist frequency.
 const SHARE_OF_RATE: f64 = 0.25;
-/// Shorter recordings tell no cutoff \[s\].
+/// Shortest total duration of recordings from which a cutoff is chosen \[s\].
 /// Physical: a few movements of an arm.
 const LEAST_S: f64 = 5.0;
 
@@ -34,12 +34,12 @@ pub(super) struct Cutoffs {
     span_s: f64,
 }
 
-/// What is left behind one cutoff.
+/// Residual peaks at one cutoff.
 #[derive(Debug)]
 struct Behind {
     cutoff_hz: f64,
     filters: Vec<Butterworth2>,
-    /// The largest residual of the second that runs, and the sum of those of all seconds before.
+    /// Largest residual of the current second, and sum of those of all previous seconds.
     peak: JointArray,
     peaks: JointArray,
 }
@@ -53,7 +53,7 @@ impl Behind {
 }
 
 impl Cutoffs {
-    /// None of the data yet; `usual_hz` is the slowest that is tried.
+    /// Creates the candidates; `usual_hz` is the default cutoff and the lowest candidate.
     pub fn new(usual_hz: f64, joints: usize) -> Self {
         let behind = |power: usize| {
             let cutoff_hz = usual_hz * STEP.powi(power as i32);
@@ -75,7 +75,7 @@ impl Cutoffs {
         }
     }
 
-    /// Takes a sample of contact-free motion behind the corrected twin.
+    /// Adds a sample of contact-free motion behind the corrected twin.
     pub fn take(&mut self, sample: &TwinState) {
         let stamp_ns = sample.header.stamp_ns;
         let dt_s = self.previous_ns.map(|ns| (stamp_ns - ns) as f64 * 1e-9);
@@ -88,7 +88,7 @@ impl Cutoffs {
                 self.all.iter_mut().for_each(Behind::end_second);
             }
         } else {
-            // A second that was not whole has smaller peaks.
+            // The peak of an incomplete second is too small.
             self.all
                 .iter_mut()
                 .for_each(|all| all.peak = [0.0; MAX_JOINTS]);
@@ -115,7 +115,8 @@ impl Cutoffs {
         }
     }
 
-    /// The cutoff of each joint \[Hz\]; nothing where the usual one is as fast as it may be, or the data are too short.
+    /// Chosen cutoff of each joint \[Hz\]; `None` if the default is the highest acceptable one, or the data are too
+    /// short.
     pub fn chosen(&self) -> Vec<Option<f64>> {
         let rate_hz = self.count as f64 / self.span_s.max(f64::MIN_POSITIVE);
         let told = self.span_s >= LEAST_S;
@@ -125,7 +126,7 @@ impl Cutoffs {
                 behind.cutoff_hz <= SHARE_OF_RATE * rate_hz && behind.peaks[j] <= GROWTH * usual
             };
             let fastest = self.all.iter().skip(1).take_while(may).last()?;
-            // People read it.
+            // Rounded for readability of the file.
             Some((10.0 * fastest.cutoff_hz).round() / 10.0)
         };
         (0..self.joints).map(|j| fast(j).filter(|_| told)).collect()
@@ -137,7 +138,7 @@ mod tests {
     use super::*;
     use tauscope_bus::Header;
 
-    /// 20 s at 500 Hz of a twin whose error swings at half a hertz, under white noise.
+    /// Chosen cutoff at 500 Hz for a twin whose error oscillates at 0.5 Hz, with white noise.
     fn behind(error: f64, noise: f64, seconds: f64) -> Option<f64> {
         let mut cutoffs = Cutoffs::new(4.5, 1);
         let mut seed = 1_u64;

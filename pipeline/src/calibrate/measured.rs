@@ -1,5 +1,5 @@
-//! What a corrected twin leaves on contact-free recordings: its noise, the low-pass that it asks for, and what the
-//! detectors' scores do behind it.
+//! Measurements of a corrected twin on contact-free recordings: residual noise, suitable low-passes, and statistics
+//! of the detectors' scores.
 
 use std::path::PathBuf;
 
@@ -32,8 +32,8 @@ impl Job<'_> {
         Ok(noise.iter().map(Spread::root_mean_square).collect())
     }
 
-    /// Chooses the low-pass on the efforts of each joint with the corrected twin `file` on `recordings`, in which
-    /// nothing may touch the robot, and writes it into it.
+    /// Chooses the low-pass on the efforts of each joint with the corrected twin `file` on contact-free `recordings`,
+    /// and stores it in `file`.
     ///
     /// # Errors
     /// If a recording cannot be read, or the twin does not fit the cell.
@@ -59,8 +59,8 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// Measures the noise of the residual and the detectors' scores with the corrected twin `file` on
-    /// `recordings`, in which nothing may touch the robot, and writes them into it. Returns what was lost.
+    /// Measures the noise of the residual and the detectors' scores with the corrected twin `file` on contact-free
+    /// `recordings`, and stores them in `file`. Returns the number of lost samples.
     ///
     /// # Errors
     /// If a recording cannot be read, or the twin does not fit the cell.
@@ -94,7 +94,7 @@ impl Job<'_> {
         }
         for (name, spread) in names.iter().zip(&noise) {
             if let Some(joint) = file.joints.get_mut(name) {
-                // About zero: a standing error of the twin is noise to a detector, too.
+                // RMS about zero, because a constant error of the twin is noise to a detector, too.
                 joint.noise = (spread.count > 0).then(|| spread.root_mean_square());
             }
         }
@@ -105,7 +105,7 @@ impl Job<'_> {
         Ok(lost)
     }
 
-    /// Every detector behind this twin, its score not yet measured.
+    /// Every detector behind this twin, with empty score statistics.
     fn detectors(&self, file: &TwinFile) -> Result<Vec<Scored>, ReplayError> {
         let setup = build::detect_setup(Some(file), self.cell)?;
         let all = tauscope_detect::Config::calibrated(&setup).map_err(build::BuildError::from)?;
@@ -116,12 +116,12 @@ impl Job<'_> {
     }
 }
 
-/// Takes the residual of a sample, joint by joint.
+/// Adds the residual of a sample, by joint.
 fn add(noise: &mut [Spread], sample: &TwinState) {
     for (spread, residual) in noise.iter_mut().zip(sample.residual) {
         spread.add(residual);
     }
 }
 
-/// A detector and what its score has done.
+/// A detector with the statistics of its score.
 type Scored = (Box<dyn Detector>, Spread);

@@ -8,13 +8,13 @@ use super::CalibrateError;
 /// Counts and findings of one recording, or of all.
 #[derive(Debug, Default)]
 pub(super) struct Read {
-    /// Samples that were lost or refused.
+    /// Number of samples that were lost or refused.
     pub lost: u64,
-    /// Joint states.
+    /// Number of joint states.
     pub samples: u64,
-    /// Joint states with measured efforts.
+    /// Number of joint states with measured efforts.
     pub measured: u64,
-    /// Samples behind settled filters.
+    /// Number of samples with settled filters.
     pub settled: u64,
     /// Whether no joint has moved.
     pub stands: bool,
@@ -29,7 +29,7 @@ impl Read {
         self.settled += other.settled;
     }
 
-    /// Why there is no sample to calibrate on.
+    /// Reason why there is no sample to calibrate on.
     pub fn why_nothing(&self, settling_s: f64) -> CalibrateError {
         match (self.measured, self.settled) {
             (0, _) => CalibrateError::NoEffort {
@@ -44,7 +44,7 @@ impl Read {
     }
 }
 
-/// Hands every sample whose filters have settled to a closure; the first one after a reset says so.
+/// Passes every sample with settled filters to a closure; the first one after a reset carries the reset flag.
 pub(super) struct Settled<'a> {
     pub plausible: &'a mut Plausible,
     pub measured: &'a mut u64,

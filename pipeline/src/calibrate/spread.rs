@@ -1,11 +1,11 @@
-//! Mean and spread.
+//! Mean and standard deviation.
 
 use tauscope_twin::ScoreStatistics;
 
-/// Mean and spread of a number, as it comes (Welford).
+/// Running mean and variance (Welford).
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Spread {
-    /// How many there were.
+    /// Number of values.
     pub count: u64,
     mean: f64,
     squares: f64,

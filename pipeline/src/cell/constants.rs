@@ -1,4 +1,4 @@
-//! Torque constants: one check for every file and argument that names them.
+//! Torque constants: a common check for files and arguments.
 
 use std::collections::BTreeMap;
 
@@ -7,19 +7,19 @@ use crate::report::{Problem, Report};
 use crate::suggest;
 use crate::yaml::{Located, Place};
 
-/// Where something is wrong with torque constants.
+/// Location of an error in torque constants.
 #[derive(Debug, Clone, Copy)]
 pub enum ConstantSpot<'a> {
-    /// All of them.
+    /// The whole table.
     All,
     /// A joint's name.
     Joint(&'a str),
-    /// A joint's constant.
+    /// The constant of a joint.
     Value(&'a str),
 }
 
 impl ConstantSpot<'_> {
-    /// Something wrong at this spot of the `torque_constants_nm_per_a` in `file` under `around`.
+    /// Problem at this location of the `torque_constants_nm_per_a` in `file` under `around`.
     pub fn problem<T>(self, file: &Located<T>, around: &Place, title: String) -> Problem {
         let place = around.key("torque_constants_nm_per_a");
         match self {
@@ -30,8 +30,8 @@ impl ConstantSpot<'_> {
     }
 }
 
-/// The constants in the order of `joints` \[N m/A\]; `None` if one is missing. What is wrong goes to `report`, as
-/// `problem` says it of a spot.
+/// Returns the constants in the order of `joints` \[N m/A\]; `None` if one is missing. Errors are added to `report`;
+/// `problem` formats one at its location.
 pub fn torque_constants(
     constants: &BTreeMap<String, f64>,
     joints: &[String],
@@ -62,7 +62,7 @@ pub fn torque_constants(
         .collect();
     if !missing.is_empty() {
         let title = format!("no torque constant for {}", suggest::list(missing));
-        let help = "torque constants are wanted for all joints or for none";
+        let help = "give torque constants for all joints or for none";
         report.push(problem(ConstantSpot::All, title).help(help));
     }
     joints

@@ -1,4 +1,4 @@
-//! The joints that a recording names, and those of the robot that it does not.
+//! Joints that a recording contains, and fixing of the robot's other joints.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use tauscope_session::{Joints, Look, SessionError};
 use crate::report::{Problem, Report};
 use crate::suggest;
 
-/// The joints that the publishers on the topic name, in the order of their messages.
+/// Returns the joint names on the topic, in the order of the messages.
 ///
 /// # Errors
 /// If the recording cannot be read or has no joint states on the topic.
@@ -19,20 +19,20 @@ pub fn recorded_joint_names(path: &Path, topic: &str) -> Result<Vec<String>, Rep
     Ok(look.recorded())
 }
 
-/// A robot with joints fixed that nobody records.
+/// A robot whose unrecorded joints are fixed.
 #[derive(Debug)]
 pub struct Fixed {
     /// Its URDF.
     pub urdf: String,
     /// The robot.
     pub model: Model,
-    /// The joints that are fixed now.
+    /// The fixed joints.
     pub joints: Vec<String>,
 }
 
 impl Fixed {
-    /// The robot `model` of `urdf` with those joints fixed that are not `recorded`, such as a gripper's. None if all are
-    /// recorded, or if they may have been recorded by other names or carry a joint that was.
+    /// Fixes the joints of the robot `model` of `urdf` that are not `recorded`, such as those of a gripper. `None` if
+    /// all are recorded, if they may have been recorded under other names, or if they carry a recorded joint.
     pub fn unrecorded(urdf: &str, model: &Model, recorded: &[String]) -> Option<Self> {
         let is_recorded = |name: &str| recorded.iter().any(|other| other == name);
         let unrecorded: Vec<&str> = model
@@ -69,12 +69,12 @@ impl Fixed {
         })
     }
 
-    /// What is said of it.
+    /// Note about the fixed joints.
     pub fn note(&self) -> String {
         let joints: Vec<&str> = self.joints.iter().map(String::as_str).collect();
         format!(
-            "No recording names {} of the robot. Fixed at position zero, or the next to it within the limits: a joint that moves all the \
-             same bears otherwise than this says. A joint that others move, such as one that a parallelogram keeps level, \
+            "No recording names {} of the robot. Unrecorded joints are fixed at position zero, or at the nearest position within the limits. If such \
+             a joint moves, the twin's efforts are wrong. A joint that others move, such as one that a parallelogram keeps level, \
              needs a <mimic> in the URDF.",
             suggest::some(&joints)
         )
@@ -89,7 +89,7 @@ mod tests {
     const INERTIAL: &str = "<inertial><mass value='1'/>\
         <inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial>";
 
-    /// A shoulder that carries an elbow that carries a finger and the thumb that mimics it.
+    /// A chain of shoulder, elbow and finger, with a thumb that mimics the finger.
     fn fixed(recorded: &[&str]) -> Option<Fixed> {
         let links = ["upper", "lower", "finger", "thumb"]
             .map(|name| format!("<link name='{name}'>{INERTIAL}</link>"));
@@ -140,7 +140,7 @@ mod tests {
             "the thumb is fixed, too"
         );
         assert!(fixed.model.joint_names().eq(["shoulder", "elbow"]));
-        // Its mass stays.
+        // The mass of the fixed links is kept.
         assert!((fixed.model.body_parameters(1)[0] - 3.0).abs() < 1e-12);
         assert!(fixed.note().contains("finger"), "{}", fixed.note());
     }

@@ -15,7 +15,7 @@ use crate::cell::EffortUnit;
 pub struct CaseFile {
     /// Name of the case.
     pub case: String,
-    /// The robot's URDF: the twin, unless `twin` names another.
+    /// The robot's URDF; also the twin, unless `twin` names another.
     #[serde(default)]
     pub robot: Option<PathBuf>,
     /// Another twin than the URDF.
@@ -24,38 +24,37 @@ pub struct CaseFile {
     /// Unit of the measured effort.
     #[serde(default)]
     pub effort_unit: EffortUnit,
-    /// Torque constant by joint \[N m/A\], for efforts in A; absent where they are not known.
+    /// Torque constant by joint \[N m/A\], for efforts in A; left out if unknown.
     #[serde(default)]
     pub torque_constants_nm_per_a: Option<BTreeMap<String, f64>>,
-    /// The joints and their order, where there is no URDF that has them; without both, those of the first
-    /// message.
+    /// The joints and their order, if there is no URDF; without both, those of the first message.
     #[serde(default)]
     pub joint_names: Option<Vec<String>>,
-    /// Nominal rate of the recordings \[Hz\], for information: time is in the stamps.
+    /// Nominal rate of the recordings \[Hz\], for information only: the stamps give the time.
     #[serde(default)]
     pub rate_hz: Option<f64>,
-    /// Whether the recordings hold velocities, for information.
+    /// Whether the recordings hold velocities, for information only.
     #[serde(default)]
     pub has_velocity: Option<bool>,
-    /// Where in the recordings the messages are.
+    /// Topics of the recordings.
     #[serde(default)]
     pub topics: CaseTopics,
-    /// Recordings that may be fitted.
+    /// Recordings to fit on.
     #[schemars(length(min = 1))]
     pub fit: Vec<PathBuf>,
-    /// Recordings that nothing is fitted on; without them some of `fit` are held out.
+    /// Recordings held out from the fit, for validation; without them some of `fit` are held out.
     #[serde(default)]
     pub holdout: Vec<PathBuf>,
 }
 
-/// A twin that is not the URDF alone: one of the two, or both for a corrected twin of a topic.
+/// A twin other than the plain URDF: one of the two keys, or both for a corrected external twin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CaseTwin {
-    /// Topic of the efforts that somebody else's simulation computed.
+    /// Topic of the efforts of an external twin.
     #[serde(default)]
     pub topic: Option<String>,
-    /// A corrected twin to start from: what is found has changed since.
+    /// A corrected twin to start from; findings are changes since then.
     #[serde(default)]
     pub model: Option<PathBuf>,
 }

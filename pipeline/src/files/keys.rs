@@ -1,26 +1,26 @@
-//! All keys of a kind of file as Markdown tables, made from its schema, so that the text is never behind the types.
+//! All keys of a kind of file as Markdown tables, generated from its schema so that they agree with the types.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt::Write as _;
 
 use serde_json::{Map, Value};
 
-/// One part of a file: where it stands, and its schema.
+/// One part of a file: its path and its schema.
 struct Part<'a> {
     path: String,
     schema: &'a Map<String, Value>,
 }
 
-/// A schema being walked.
+/// State of a walk through a schema.
 struct Walk<'a> {
     definitions: Option<&'a Map<String, Value>>,
-    /// Where a definition was told first.
+    /// Path of the first use of each definition.
     told: BTreeMap<&'a str, String>,
     waiting: VecDeque<Part<'a>>,
 }
 
-/// The keys of a file with this schema: for each part a heading of this level with its path, and a table. `[]` in a
-/// path is each element of a list, `*` each name.
+/// Keys of a file with this schema: for each part a heading of this level with its path, and a table. In a path, `[]`
+/// stands for each element of a list and `*` for each name.
 pub fn keys(schema: &Value, level: usize) -> String {
     let mut text = String::new();
     let Some(top) = schema.as_object() else {
@@ -51,7 +51,7 @@ pub fn keys(schema: &Value, level: usize) -> String {
 }
 
 impl<'a> Walk<'a> {
-    /// The table of a part; parts below it wait for tables of their own.
+    /// Table of a part; nested parts are queued for their own tables.
     fn table(&mut self, part: &Part<'a>) -> String {
         let mut table =
             String::from("| key | value | default | meaning |\n| --- | --- | --- | --- |\n");
@@ -83,7 +83,8 @@ impl<'a> Walk<'a> {
         table
     }
 
-    /// Lets the objects in a value wait for a table; or says where the same was told already.
+    /// Queues the objects in a value for their own tables. Returns the path of the first use of an already described
+    /// one.
     fn go_down(&mut self, value: &'a Value, path: &str) -> Option<String> {
         let schema = value.as_object()?;
         if let Some(name) = reference(schema) {
@@ -130,7 +131,7 @@ impl<'a> Walk<'a> {
         self.definitions?.get(name)?.as_object()
     }
 
-    /// What a value may be, in words.
+    /// Allowed values, in words.
     fn kind(&self, value: &Value) -> String {
         let Some(schema) = value.as_object() else {
             return "anything".to_owned();
@@ -211,19 +212,19 @@ fn properties(schema: &Map<String, Value>) -> Option<&Map<String, Value>> {
     schema.get("properties").and_then(Value::as_object)
 }
 
-/// The name of the definition that a schema refers to.
+/// Name of the definition that a schema refers to.
 fn reference(schema: &Map<String, Value>) -> Option<&str> {
     schema.get("$ref")?.as_str()?.strip_prefix("#/$defs/")
 }
 
-/// The description on one line.
+/// Description on one line.
 fn description(schema: &Map<String, Value>) -> String {
     let text = schema.get("description").and_then(Value::as_str);
     let words = text.unwrap_or_default().replace('\\', "");
     words.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// The text in lines that an editor shows whole.
+/// Wraps the text at the line width of an editor.
 fn wrapped(text: &str) -> String {
     const WIDTH: usize = 120;
     let mut lines: Vec<String> = Vec::new();

@@ -1,4 +1,4 @@
-//! `SET.yaml`: labelled recordings that detectors are evaluated on.
+//! `SET.yaml`: labelled recordings for the evaluation of detectors.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -15,14 +15,13 @@ use crate::cell::EffortUnit;
 pub struct SetFile {
     /// Name of the set.
     pub set: String,
-    /// The robot's URDF; may be left out where the twin is a topic.
+    /// The robot's URDF; may be left out if the twin is a topic.
     #[serde(default)]
     pub robot: Option<PathBuf>,
-    /// The labels; without them `labels.json` or `labels_train.json` beside the file, or the contact
-    /// topic.
+    /// File of labels; by default `labels.json` or `labels_train.json` next to this file, or the contact topic.
     #[serde(default)]
     pub labels: Option<PathBuf>,
-    /// Nominal rate of the recordings \[Hz\], for information: time is in the stamps.
+    /// Nominal rate of the recordings \[Hz\], for information only: the stamps give the time.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub rate_hz: Option<f64>,
@@ -35,47 +34,47 @@ pub struct SetFile {
     /// The link that carries the tool.
     #[serde(default)]
     pub tool_link: Option<String>,
-    /// Where on the tool it is touched \[m, in the tool link's frame\].
+    /// Contact point on the tool \[m, in the tool link's frame\].
     #[serde(default)]
     pub contact_point_on_tool_m: Option<[f64; 3]>,
-    /// Where in the recordings the messages are.
+    /// Topics of the recordings.
     #[serde(default)]
     pub topics: SetTopics,
-    /// The impedance that a Cartesian controller held.
+    /// Impedance of the Cartesian controller during the recordings.
     #[serde(default)]
     pub impedance: Option<Impedance>,
     /// Length of one cycle of a cyclic motion \[s\].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub cycle_s: Option<f64>,
-    /// How many cycles the train recordings hold, for information: detectors learn from all of these recordings.
+    /// Number of cycles in the train recordings, for information only: detectors learn from all of these recordings.
     #[serde(default)]
     #[schemars(range(min = 1))]
     pub learning_cycles: Option<u32>,
-    /// For so long nothing touches the robot at the beginning of each recording \[s\]: there `tauscope` takes its offset from.
+    /// Contact-free time at the beginning of each recording, from which `tauscope` takes its offset \[s\].
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub free_first_s: f64,
-    /// How long after the end of a contact an alarm does not count as false \[s\]: the time in which the arm recovers, such as
-    /// that of a protective stop.
+    /// Recovery time after a contact in which an alarm is not counted as false, such as the duration of a protective
+    /// stop \[s\].
     #[serde(default = "recovery_s")]
     #[schemars(range(min = 0.0))]
     pub recovery_s: f64,
-    /// Settings of detectors by name, as a pipeline's `detect` has them. `threshold` and `hold_s` beside them are for all.
+    /// Settings of detectors by name, as under a pipeline's `detect`. `threshold` and `hold_s` apply to all of them.
     #[serde(default)]
     pub detectors: tauscope_detect::Config,
-    /// Contact-free recordings that detectors are trained on.
+    /// Contact-free recordings for training.
     #[serde(default)]
     pub train: Vec<PathBuf>,
-    /// Recordings that thresholds are chosen on.
+    /// Recordings for choosing thresholds.
     #[serde(default)]
     pub validation: Vec<PathBuf>,
-    /// Recordings that are scored.
+    /// Recordings to be scored.
     #[serde(default)]
     pub test: Vec<PathBuf>,
 }
 
-/// So long after its end an alarm may still be of the contact, because filters are slow.
+/// Default recovery time, because filters delay the end of a contact \[s\].
 fn recovery_s() -> f64 {
     0.15
 }
@@ -88,9 +87,9 @@ pub struct SetTopics {
     pub state: String,
     /// Commanded positions.
     pub command: Option<String>,
-    /// Efforts that another twin computed.
+    /// Efforts of an external twin.
     pub twin: Option<String>,
-    /// Whether something touches the robot (`std_msgs/msg/Bool`).
+    /// Contact flag (`std_msgs/msg/Bool`).
     pub contact: Option<String>,
 }
 
@@ -115,7 +114,7 @@ pub struct Impedance {
     /// Rotational stiffness \[N m/rad\].
     #[schemars(range(min = 0.0))]
     pub rotational_nm_per_rad: f64,
-    /// The damping's rule in words, e.g. `2 sqrt(K)`.
+    /// Damping rule in words, e.g. `2 sqrt(K)`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damping: Option<String>,
 }

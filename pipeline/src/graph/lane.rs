@@ -1,16 +1,16 @@
-//! A stream between stages of one thread: a sample lies where its maker wrote it until all have read it.
+//! A stream between stages of one thread. A sample stays in place until all readers have read it.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use tauscope_bus::{Header, Received, Sample, flags};
 
-/// The samples of one step of the source that somebody has yet to read.
+/// Buffer of the samples of one step of the source.
 #[derive(Debug)]
 pub(super) struct Lane<T> {
     stage: String,
     samples: RefCell<Vec<T>>,
-    /// How many of `samples` each reader has taken.
+    /// Number of `samples` that each reader has read.
     taken: RefCell<Vec<Rc<Cell<usize>>>>,
     sent: Cell<u64>,
     refused: Cell<bool>,
@@ -18,7 +18,7 @@ pub(super) struct Lane<T> {
 }
 
 impl<T: Sample> Lane<T> {
-    /// Of what the stage of that name puts out.
+    /// Creates the output buffer of the stage of that name.
     pub fn of(stage: &str) -> Rc<Self> {
         Rc::new(Self {
             stage: stage.to_owned(),
@@ -30,8 +30,8 @@ impl<T: Sample> Lane<T> {
         })
     }
 
-    /// Lets `write` fill a new sample, numbers it and keeps it for the readers, as a link between processes does;
-    /// like one, it hands on nothing that a stage must not see.
+    /// Lets `write` fill a new sample, numbers it and stores it for the readers. Like a link between processes, it
+    /// drops invalid samples.
     pub fn write(&self, write: &mut dyn FnMut(&mut T)) -> Header {
         let mut samples = self.samples.borrow_mut();
         let place = samples.len();
@@ -57,17 +57,17 @@ impl<T: Sample> Lane<T> {
         header
     }
 
-    /// Nothing more follows.
+    /// Marks the end of the stream.
     pub fn end(&self) {
         self.ended.set(true);
     }
 
-    /// Samples that were written.
+    /// Number of samples written.
     pub fn sent(&self) -> u64 {
         self.sent.get()
     }
 
-    /// A reader of all that is written from now on.
+    /// Creates a reader of all samples written from now on.
     pub fn reader(self: &Rc<Self>) -> Reader<T> {
         let taken = Rc::new(Cell::new(self.samples.borrow().len()));
         self.taken.borrow_mut().push(Rc::clone(&taken));
@@ -79,9 +79,9 @@ impl<T: Sample> Lane<T> {
     }
 }
 
-/// A lane, whatever its type is.
+/// A lane, independent of its sample type.
 pub(super) trait Tidy {
-    /// Forgets the samples once every reader has taken all.
+    /// Clears the buffer once every reader has read all samples.
     fn tidy(&self);
 }
 
@@ -96,7 +96,7 @@ impl<T: Sample> Tidy for Lane<T> {
     }
 }
 
-/// One who reads a lane.
+/// Reader of a lane.
 #[derive(Debug)]
 pub(super) struct Reader<T> {
     lane: Rc<Lane<T>>,
@@ -105,7 +105,7 @@ pub(super) struct Reader<T> {
 }
 
 impl<T: Sample> Reader<T> {
-    /// Hands the next sample to `read` where it lies.
+    /// Passes the next sample to `read` in place.
     pub fn receive<R>(&mut self, read: impl FnOnce(&T) -> R) -> (Received, Option<R>) {
         let samples = self.lane.samples.borrow();
         let Some(sample) = samples.get(self.taken.get()) else {
@@ -124,7 +124,7 @@ impl<T: Sample> Reader<T> {
         (Received::Sample, Some(read(sample)))
     }
 
-    /// Samples that it was given.
+    /// Number of samples read.
     pub fn received(&self) -> u64 {
         self.received
     }

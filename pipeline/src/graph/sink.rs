@@ -1,4 +1,4 @@
-//! The end of a graph: streams of any type into one sink.
+//! Sinks of a graph, with inputs of any sample type.
 
 use tauscope_bus::{Received, Sample, Sink, StageError};
 
@@ -7,7 +7,7 @@ use super::{Node, StageCounts};
 
 /// A reader whose sample type is known at run time only.
 trait AnyInput {
-    /// Hands `sink` all samples of the stage `from` that there are; false once no more can come.
+    /// Passes all available samples of the stage `from` to `sink`; false at the end of the stream.
     fn take_all(&mut self, from: &str, sink: &mut dyn Sink) -> Result<bool, StageError>;
     fn received(&self) -> u64;
 }
@@ -27,7 +27,7 @@ impl<T: Sample> AnyInput for Reader<T> {
     }
 }
 
-/// One of the streams that a sink listens to.
+/// Input stream of a sink.
 pub struct SinkInput {
     from: String,
     receiver: Box<dyn AnyInput>,
@@ -35,7 +35,7 @@ pub struct SinkInput {
 }
 
 impl SinkInput {
-    /// The stream of the stage `from`.
+    /// Creates an input for the stream of the stage `from`.
     pub(super) fn new<T: Sample>(from: &str, receiver: Reader<T>) -> Self {
         Self {
             from: from.to_owned(),

@@ -1,4 +1,4 @@
-//! What a cell's entry says, looked up in its URDF.
+//! Resolution of a cell's entry against its URDF.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use crate::suggest;
 use crate::urdf;
 use crate::yaml::{Located, Place};
 
-/// Looks up every cell; those in which something is wrong are left out and reported.
+/// Resolves every cell; invalid ones are left out and reported.
 pub fn resolve(file: &Located<PipelineFile>, report: &mut Report) -> BTreeMap<String, Cell> {
     let mut cells = BTreeMap::new();
     for (name, entry) in &file.value.cells {

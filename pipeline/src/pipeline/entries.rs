@@ -1,4 +1,4 @@
-//! What the stages' own parts of the file name: recordings, twins, programs, outputs.
+//! Resolution of the stages' settings: recordings, twins, programs, outputs.
 
 mod detector;
 mod model_fits;
@@ -26,17 +26,17 @@ use crate::scenario::ScenarioFacts;
 use crate::settings::{OutsideEntry, Settings};
 use crate::yaml::{self, Located, Place};
 
-/// What the files that stages name hold.
+/// Resolved settings and the content of the files that they name.
 pub struct Files {
-    /// What each stage is told; `None` where something is wrong.
+    /// Settings by stage; `None` if they are invalid.
     pub settings: Vec<Option<Settings>>,
     /// SHA-256 of each twin's model, by the stage's name.
     pub model_sha256: BTreeMap<String, String>,
-    /// The scenarios of simulated sources.
+    /// Scenarios of simulated sources, by stage.
     pub scenarios: BTreeMap<usize, ScenarioFacts>,
 }
 
-/// Reads and checks what each stage names, by place in the file.
+/// Reads and checks the settings of all stages, in the order of the file.
 pub fn resolve(
     file: &Located<PipelineFile>,
     purpose: Purpose<'_>,
@@ -55,7 +55,7 @@ pub fn resolve(
         scenarios: BTreeMap::new(),
     };
     let count = file.value.stages.len();
-    // Twins before detectors, which rest on their models.
+    // Twins before detectors, which need their models.
     for index in 0..count {
         resolver.twin_model(index);
     }
@@ -74,7 +74,7 @@ struct Resolver<'a> {
     cells: &'a BTreeMap<String, Cell>,
     wiring: Option<&'a Wiring>,
     report: &'a mut Report,
-    /// By twin stage; absent where the twin names none or it is wrong.
+    /// Models by twin stage; absent if the twin names none or it is invalid.
     models: BTreeMap<usize, TwinFile>,
     model_sha256: BTreeMap<String, String>,
     scenarios: BTreeMap<usize, ScenarioFacts>,
@@ -85,7 +85,7 @@ impl<'a> Resolver<'a> {
         &self.file.value.stages[index]
     }
 
-    /// Whether the stage runs where the check runs, as far as one knows. In a replay no stage has files of its own.
+    /// Whether the stage may run on the host of the check. In a replay no stage has files of its own.
     fn is_here(&self, index: usize) -> bool {
         let Purpose::Run { host: here } = self.purpose else {
             return false;
@@ -94,12 +94,12 @@ impl<'a> Resolver<'a> {
         here.is_none() || host.is_none() || host == here
     }
 
-    /// The stage's cell, if stage and cell are sound so far.
+    /// The stage's cell, if stage and cell are valid so far.
     fn cell(&self, index: usize) -> Option<&'a Cell> {
         self.cells.get(self.wiring?.cells[index].first()?)
     }
 
-    /// The stage that this one rests on, going up from input to input, which is a `wanted`.
+    /// The nearest stage upstream of this one whose role is `wanted`.
     fn above(&self, index: usize, wanted: fn(Role) -> bool) -> Option<usize> {
         let wiring = self.wiring?;
         let mut at = index;
@@ -197,8 +197,7 @@ impl<'a> Resolver<'a> {
         Some(Settings::Ingest(Box::new(config)))
     }
 
-    /// Opens a source that reads files, as the stage will: what is wrong with them is known before
-    /// anything starts.
+    /// Opens a source that reads files as the stage will, so that errors in them are reported before the start.
     fn try_to_open(
         &mut self,
         index: usize,
@@ -291,7 +290,7 @@ impl<'a> Resolver<'a> {
         })
     }
 
-    /// What a twin wants of the source, the source must read.
+    /// Checks that the source reads the topics that the twin needs.
     fn topics_for(&mut self, index: usize, place: &Place, config: &tauscope_twin::Config) {
         let Some(source) = self.above(index, |role| role == Role::Ingest) else {
             return;
@@ -351,7 +350,7 @@ impl<'a> Resolver<'a> {
         let twin_config = twin.and_then(|twin| self.entry(twin).twin.clone());
         let twin_config = twin_config.unwrap_or_default();
         if twin_config.model.is_some() && model.is_none() {
-            // The twin's model is wrong, which has been said.
+            // The twin's model is invalid, which is already reported.
             return None;
         }
         let effort_cutoff_hz = twin_config
@@ -390,7 +389,7 @@ impl<'a> Resolver<'a> {
                 self.report.push(self.file.at(&place.index(0), title));
                 return None;
             }
-            // Absolute, because it is started in the folder of the file.
+            // Absolute, because the program is started in the folder of the pipeline file.
             let path = std::path::absolute(&path).unwrap_or(path);
             *program = path.display().to_string();
         }

@@ -1,4 +1,4 @@
-//! The pipeline file as it is written.
+//! Format of the pipeline file.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use crate::cell::{EffortUnit, ToolEntry};
 use crate::settings::OutsideEntry;
 use crate::yaml::Place;
 
-/// A pipeline: which stages there are, what they listen to, and on which host each one runs.
+/// A pipeline: its stages, their inputs, and the host of each one.
 ///
 /// Paths are relative to the file.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -24,11 +24,11 @@ pub struct PipelineFile {
     /// The robots' cells by name. The name is the prefix of the cell's streams, of its Zenoh keys and
     /// of its entities in Rerun.
     pub cells: BTreeMap<String, CellEntry>,
-    /// The hosts by name; left out where everything runs on one.
+    /// The hosts by name; left out if everything runs on one host.
     #[serde(default)]
     pub hosts: BTreeMap<String, HostEntry>,
-    /// The process in which the sources, twins, detectors and watches of all cells run, where their cell or they
-    /// themselves name no other. Left out, each cell has a process of its own.
+    /// The process of the sources, twins, detectors and watches of all cells, unless their cell or they themselves
+    /// name another. If left out, each cell has its own process.
     #[serde(default)]
     pub process: Option<String>,
     /// The stages, in any order.
@@ -36,36 +36,35 @@ pub struct PipelineFile {
     pub stages: Vec<StageEntry>,
 }
 
-/// A robot and what is known of it.
+/// A robot and its properties.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CellEntry {
-    /// The robot's URDF. May be left out where the expected effort comes from a topic; then `joints`
-    /// names the joints.
+    /// The robot's URDF. May be left out if the expected effort comes from a topic; then `joints` names the joints.
     #[serde(default)]
     pub robot: Option<PathBuf>,
-    /// The joints, in the order wanted. Only without a `robot`, which has its own.
+    /// The joints in order. Only without `robot`, whose URDF defines the joints.
     #[serde(default)]
     pub joints: Option<Vec<String>>,
     /// Unit of the measured effort.
     #[serde(default)]
     pub effort_unit: EffortUnit,
-    /// Torque constant by joint \[N m/A\], for efforts in A, if they are known: effort in A times the
-    /// constant is the torque at the joint.
+    /// Torque constant by joint \[N m/A\], for efforts in A, if known: effort in A times the constant is the torque
+    /// at the joint.
     #[serde(default)]
     pub torque_constants_nm_per_a: Option<BTreeMap<String, f64>>,
-    /// The tool, where the URDF has it not.
+    /// The tool, if the URDF does not contain it.
     #[serde(default)]
     pub tool: Option<ToolEntry>,
-    /// The impedance that a Cartesian controller holds the tool with, where there is one.
+    /// The impedance of a Cartesian controller at the tool, if there is one.
     #[serde(default)]
     pub impedance: Option<tauscope_detect::Impedance>,
-    /// The process in which the cell's source, twins, detectors and watches run, where they themselves name no other.
+    /// The process of the cell's source, twins, detectors and watches, unless they themselves name another.
     #[serde(default)]
     pub process: Option<String>,
 }
 
-/// How a host is reached by the others.
+/// Network endpoints of a host.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct HostEntry {
@@ -73,8 +72,8 @@ pub struct HostEntry {
     pub listen: Endpoints,
     /// Zenoh endpoints that this host connects to: one, or a list.
     pub connect: Endpoints,
-    /// Samples for other hosts wait at most so long for more, to go in one message \[ms\]. Alarms and commands never
-    /// wait. A shorter time costs more of a core, on all hosts.
+    /// Longest time that samples for other hosts wait to be sent together in one message \[ms\]. Alarms and commands
+    /// never wait. A shorter time costs more CPU time on all hosts.
     #[schemars(range(min = 0, max = 100))]
     pub gather_ms: u64,
 }
@@ -89,7 +88,8 @@ impl Default for HostEntry {
     }
 }
 
-/// Resolution: how late a sample is on another host, against the cost of a message.
+/// Default of [`HostEntry::gather_ms`] \[ms\].
+/// Resolution: latency of a sample on another host, against the cost of a message.
 const GATHER_MS: u64 = 10;
 
 /// One endpoint or several.
@@ -97,7 +97,7 @@ const GATHER_MS: u64 = 10;
 #[serde(from = "OneOrMany", into = "Vec<String>")]
 pub struct Endpoints(pub Vec<String>);
 
-/// What [`Endpoints`] may be written as.
+/// Notations of [`Endpoints`] in the file.
 #[derive(Deserialize, JsonSchema)]
 #[serde(untagged)]
 enum OneOrMany {
@@ -120,84 +120,84 @@ impl From<Endpoints> for Vec<String> {
     }
 }
 
-/// A stage: its name, where it runs, what it listens to, and exactly one of `ingest`, `twin`,
-/// `detect`, `explain`, `record`, `publish` and `outside`, which says what it is.
+/// A stage: its name, its host and process, its inputs, and exactly one of `ingest`, `twin`, `detect`, `explain`,
+/// `record`, `publish` and `outside`, which defines its kind.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StageEntry {
     /// The stage's name: letters, digits, `_` and `-`. Others listen to it by this name.
     pub name: String,
-    /// The cell, for a stage that listens to nobody; the others are in the cell of what they listen
-    /// to. May be left out where there is one cell.
+    /// The cell of a stage without inputs; other stages belong to the cell of their inputs. May be left out if there
+    /// is only one cell.
     #[serde(default)]
     pub cell: Option<String>,
-    /// The host it runs on, where the file names several.
+    /// The host it runs on, if the file names several.
     #[serde(default)]
     pub host: Option<String>,
-    /// The process it runs in. Stages on one host that name the same one share it. Left out, it is that of the cell,
-    /// and for `record` and `publish` one of its own.
+    /// The process it runs in. Stages on one host with the same process name share it. By default it is the process
+    /// of the cell; `record` and `publish` have their own.
     #[serde(default)]
     pub process: Option<String>,
     /// The stage it listens to.
     #[serde(default)]
     pub input: Option<String>,
-    /// The stages it listens to, for a stage that takes many streams.
+    /// The stages it listens to, for a stage with several inputs.
     #[serde(default)]
     pub inputs: Option<Vec<String>>,
-    /// What becomes of samples that it has no time for.
+    /// Overflow policy for samples that it does not process in time.
     #[serde(default)]
     pub keep: Option<KeepEntry>,
-    /// How it learns that a sample is there, if another process of its host sends it. Left out, the sender wakes it; a
-    /// recorder looks a hundred times a second, so that it costs those before it nothing.
+    /// Wake-up on a new sample from another process of its host. By default the sender wakes it; a recorder polls 100
+    /// times a second, so that it does not slow down the stages before it.
     #[serde(default)]
     pub wake: Option<WakeEntry>,
-    /// When it is started again after it died. Left out: `on_failure`.
+    /// Restart policy after a crash; by default `on_failure`.
     #[serde(default)]
     pub restart: Option<RestartEntry>,
-    /// A source: where joint states come from.
+    /// A source of joint states.
     #[serde(default)]
     pub ingest: Option<tauscope_ingest::Config>,
-    /// The twin: what the effort should have been.
+    /// The twin, which computes the expected effort.
     #[serde(default)]
     pub twin: Option<tauscope_twin::Config>,
     /// A detector of contacts.
     #[serde(default)]
     pub detect: Option<tauscope_detect::Config>,
-    /// A watch over a twin: says when its residual changes character, and which physics changed.
+    /// A watch over a twin: reports when its residual changes, and which physical effect changed.
     #[serde(default)]
     pub explain: Option<tauscope_watch::Config>,
-    /// A recorder: archive and picture.
+    /// A recorder of archives and pictures.
     #[serde(default)]
     pub record: Option<tauscope_record::Config>,
-    /// A publisher: what the robot's cell is told, over Zenoh and Modbus. Not a safety function.
+    /// A publisher of contacts and status to the robot's cell, over Zenoh and Modbus. Not a safety function.
     #[serde(default)]
     pub publish: Option<tauscope_publish::Config>,
-    /// A stage that is not ours: a program that takes its place in the pipeline.
+    /// An external program as a stage of the pipeline.
     #[serde(default)]
     pub outside: Option<OutsideEntry>,
 }
 
-/// What becomes of samples that a stage has no time for.
+/// Overflow policy for samples that a stage does not process in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum KeepEntry {
-    /// Those before it wait: nothing is lost.
+    /// The stages before it wait, so no sample is lost.
     All,
-    /// The oldest give way and are counted, so that it works on what is new.
+    /// The oldest samples are dropped and counted, so that it processes recent ones.
     Newest,
 }
 
-/// How a stage learns that a sample is there.
+/// Wake-up of a stage on a new sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WakeEntry {
     /// The sender wakes it.
     Event,
-    /// It looks all the time, which takes a core: the least latency.
+    /// It polls continuously: the lowest latency, at the cost of one core.
     Spin,
 }
 
-/// Place of stage `index` in the file.
+/// Place of the stage `index` in the file.
 pub(super) fn stage_place(index: usize) -> Place {
     Place::root().key("stages").index(index)
 }

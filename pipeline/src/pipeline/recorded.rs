@@ -1,4 +1,4 @@
-//! What the recorders of a pipeline are told, and what speaks against its detectors.
+//! Input of a pipeline's recorders, and warnings about its robots, twins and detectors.
 
 use std::collections::BTreeMap;
 
@@ -14,8 +14,8 @@ use crate::provenance::sha256;
 use crate::settings::Settings;
 
 impl Pipeline {
-    /// What speaks against running its detectors (on `host`, if one is given) as they are set, though they can be run,
-    /// and what of its robots was not believed.
+    /// Warnings about valid but questionable settings of detectors (on `host`, if given), and about implausible
+    /// values of robots.
     pub fn warnings(&self, host: Option<&str>) -> Vec<String> {
         let here = |stage: &&Stage| host.is_none() || stage.host.as_deref() == host;
         let mut warnings = Vec::new();
@@ -31,7 +31,7 @@ impl Pipeline {
                 continue;
             };
             let cell = stage.cells.first().and_then(|cell| self.cells.get(cell));
-            // What is wrong with it has been said.
+            // An error in it is already reported.
             let setup = cell.and_then(|cell| build::detect_setup(model.as_ref(), cell).ok());
             if let Some(warning) = setup.and_then(|setup| config.warning(&setup)) {
                 warnings.push(format!("{}: {warning}", stage.name));
@@ -40,7 +40,7 @@ impl Pipeline {
         warnings
     }
 
-    /// Twins whose low-passes would pass everything, where the rate of their source is known before it is read.
+    /// Warnings about twins whose low-passes have no effect, if the rate of their source is known in advance.
     pub fn rate_warnings(&self, host: Option<&str>) -> Vec<String> {
         let here = |stage: &&Stage| host.is_none() || stage.host.as_deref() == host;
         let mut warnings = Vec::new();
@@ -59,7 +59,7 @@ impl Pipeline {
         warnings
     }
 
-    /// What a recorder must know of the streams of these stages.
+    /// Properties of the streams of these stages that a recorder needs.
     pub fn streams(&self, stages: &[usize]) -> Vec<StreamFacts> {
         let makers = stages.iter().map(|&from| &self.stages[from]);
         let facts = makers.filter_map(|maker| {
@@ -82,10 +82,10 @@ impl Pipeline {
         facts.collect()
     }
 
-    /// A recorder of the streams that these stages put out.
+    /// Builds a recorder of the output streams of these stages.
     ///
     /// # Errors
-    /// If streams and file names do not fit together, or a file cannot be made.
+    /// If streams and file names are inconsistent, or a file cannot be created.
     pub fn recorder(
         &self,
         config: &tauscope_record::Config,
@@ -97,7 +97,7 @@ impl Pipeline {
         build::recorder(config, &cells, &streams, &self.provenance())
     }
 
-    /// For the metadata of everything that it records.
+    /// Provenance for the metadata of all recorded files.
     pub fn provenance(&self) -> BTreeMap<String, String> {
         let mut all = BTreeMap::from([
             ("tauscope".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
@@ -115,7 +115,7 @@ impl Pipeline {
     }
 }
 
-/// How many joint states a second a source gives, where that is known before it is read.
+/// Sample rate of a source \[Hz\], if known before it is read.
 fn rate_hz(source: &Stage) -> Option<f64> {
     let Settings::Ingest(config) = &source.settings else {
         return None;

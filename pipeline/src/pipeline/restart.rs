@@ -1,42 +1,42 @@
-//! When a stage that died is started again, as the pipeline file says.
+//! Restart policy of a stage.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// When a stage is started again, and when that is given up, which ends the run.
+/// Restart policy of a stage. Exceeding the number of restarts ends the run.
 ///
-/// Stages of one thread begin and die together: of what they say, the strictest holds.
+/// Stages of one thread start and end together; the strictest of their policies applies.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Restart {
-    /// After which ends.
+    /// Ends after which the stage is restarted.
     pub when: When,
-    /// How often within `within_s`; once more gives it up.
+    /// Largest number of restarts within `within_s`; one more ends the run.
     pub most: u32,
-    /// Over which time starts are counted \[s\].
+    /// Time window in which restarts are counted \[s\].
     #[schemars(range(min = 1.0, max = 86_400.0))]
     pub within_s: f64,
-    /// The second start within `within_s` comes so long after the death, each one more after twice the time before
-    /// \[s\]. The first one comes at once.
+    /// Delay before the second restart within `within_s` \[s\], doubled for each further one. The first restart is
+    /// immediate.
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub wait_s: f64,
-    /// But no start comes later than this \[s\].
+    /// Upper bound of the delay \[s\].
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub longest_wait_s: f64,
 }
 
-/// After which ends a stage is started again.
+/// Ends after which a stage is restarted.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum When {
-    /// After none: its death ends the run.
+    /// None: its end ends the run.
     Never,
-    /// If it failed or was killed.
+    /// It failed or was killed.
     #[default]
     OnFailure,
-    /// Also if it ended by itself, for an `outside` program that ends where it should not.
+    /// It failed, was killed, or ended by itself, for an `outside` program that ends unexpectedly.
     Always,
 }
 
@@ -53,7 +53,7 @@ impl Default for Restart {
 }
 
 impl Restart {
-    /// The strictest of both.
+    /// Combines two policies into the strictest one.
     #[must_use]
     pub fn strictest(self, other: Self) -> Self {
         Self {
@@ -66,13 +66,13 @@ impl Restart {
     }
 }
 
-/// What a file may have: the word alone, or all of it.
+/// Notations of a restart policy in the file: the keyword alone, or the full policy.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum RestartEntry {
-    /// After which ends; the rest as it is by default.
+    /// Ends after which the stage is restarted; defaults for the rest.
     Word(When),
-    /// All of it.
+    /// The full policy.
     All(Restart),
 }
 

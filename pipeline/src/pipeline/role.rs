@@ -1,11 +1,11 @@
-//! What a stage is: which of the seven, what it takes and what it gives.
+//! Stage kinds with their input and output sample types.
 
 use tauscope_bus::SampleKind;
 
 use super::file::StageEntry;
 use crate::settings::OutputEntry;
 
-/// Which of the seven kinds of stage.
+/// Kind of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// A source of joint states.
@@ -20,14 +20,14 @@ pub enum Role {
     Record,
     /// A publisher.
     Publish,
-    /// A program that is not ours, and what it puts out.
+    /// An external program, with its output type.
     Outside(Option<SampleKind>),
 }
 
-/// What a stage may listen to.
+/// Permitted inputs of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Takes {
-    /// It is a source.
+    /// None: the stage is a source.
     Nothing,
     /// One stream of this kind.
     One(SampleKind),
@@ -37,13 +37,13 @@ pub enum Takes {
     Many,
 }
 
-/// The keys of a stage that say what it is.
+/// Keys that define the kind of a stage.
 pub const ROLE_KEYS: [&str; 7] = [
     "ingest", "twin", "detect", "explain", "record", "publish", "outside",
 ];
 
 impl Role {
-    /// All that `entry` claims to be, with the key that says so. Exactly one in a good file.
+    /// All kinds that `entry` declares, with their keys. A valid entry declares exactly one.
     pub fn claimed(entry: &StageEntry) -> Vec<(&'static str, Self)> {
         let outside = entry
             .outside
@@ -65,7 +65,7 @@ impl Role {
             .collect()
     }
 
-    /// The key in the file.
+    /// Key in the file.
     pub fn key(self) -> &'static str {
         match self {
             Self::Ingest => "ingest",
@@ -78,7 +78,7 @@ impl Role {
         }
     }
 
-    /// What it may listen to.
+    /// Permitted inputs.
     pub fn takes(self) -> Takes {
         match self {
             Self::Ingest => Takes::Nothing,
@@ -89,12 +89,12 @@ impl Role {
         }
     }
 
-    /// Whether it also hears how the stages fare that it listens to.
+    /// Whether it also receives the health reports of its input stages.
     pub fn hears_health(self) -> bool {
         matches!(self, Self::Record | Self::Publish)
     }
 
-    /// What it puts out.
+    /// Output sample type.
     pub fn gives(self) -> Option<SampleKind> {
         match self {
             Self::Ingest => Some(SampleKind::JointState),
@@ -106,7 +106,7 @@ impl Role {
     }
 }
 
-/// The stages that put out `kind`, for people.
+/// Stages that emit `kind`, in words.
 pub fn makers_of(kind: SampleKind) -> &'static str {
     match kind {
         SampleKind::JointState => "an `ingest` stage",

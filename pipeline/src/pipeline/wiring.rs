@@ -1,4 +1,4 @@
-//! Who listens to whom, and whether that makes a pipeline.
+//! Graph of the stages and its validation.
 
 mod endpoints;
 mod inputs;
@@ -15,24 +15,24 @@ use crate::report::Report;
 use crate::suggest;
 use crate::yaml::{Located, Place};
 
-/// The graph of a pipeline; stages by their place in the file.
+/// The graph of a pipeline; stages by index in the file.
 #[derive(Debug)]
 pub struct Wiring {
-    /// What each stage is.
+    /// Kind of each stage.
     pub roles: Vec<Role>,
-    /// What each stage listens to.
+    /// Inputs of each stage.
     pub inputs: Vec<Vec<usize>>,
-    /// All stages, each after those it listens to.
+    /// Topological order of the stages.
     pub order: Vec<usize>,
-    /// The cells each stage belongs to: one, but for a stage that takes many streams.
+    /// Cells of each stage: one, except for a stage with several inputs.
     pub cells: Vec<BTreeSet<String>>,
-    /// The host each stage runs on, where the file names hosts.
+    /// Host of each stage, if the file names hosts.
     pub hosts: Vec<Option<String>>,
-    /// The process each stage runs in, on its host.
+    /// Process of each stage on its host.
     pub processes: Vec<String>,
 }
 
-/// Checks names, roles, inputs, cells and hosts; `None` if they make no pipeline.
+/// Checks names, roles, inputs, cells and hosts; `None` if they are invalid.
 pub fn check(file: &Located<PipelineFile>, report: &mut Report) -> Option<Wiring> {
     let mut checker = Checker {
         file,
@@ -68,7 +68,7 @@ pub fn check(file: &Located<PipelineFile>, report: &mut Report) -> Option<Wiring
     })
 }
 
-/// One thing that a stage listens to.
+/// An input of a stage.
 struct Input {
     stage: usize,
     place: Place,
@@ -87,7 +87,7 @@ impl Checker<'_> {
         self.broken = true;
     }
 
-    /// Names become parts of keys on the bus and of entity paths, and must be told apart.
+    /// Checks names: they become parts of bus keys and of entity paths, and must be unique.
     fn names(&mut self) {
         let top = Place::root();
         let cells = self

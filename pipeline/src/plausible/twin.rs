@@ -1,5 +1,5 @@
-//! What cannot be in a twin's samples: efforts with the other sign or in another unit than the twin's, and a low-pass
-//! that passes everything.
+//! Plausibility of a twin's samples: efforts with the wrong sign or unit, missing efforts, and a low-pass without
+//! effect.
 
 use tauscope_archive::{ArchiveError, Recording};
 use tauscope_bus::{TwinState, flags};
@@ -9,33 +9,33 @@ use tauscope_twin::{Calibration, Filters, TwinFile, telling_slopes};
 use super::PAUSE_NS;
 use crate::cell::{Cell, EffortUnit};
 
-/// Samples in which some joint moves, for the slopes to be worth a word.
+/// Smallest number of samples with motion for which the slopes are judged.
 /// Resolution: ten seconds at 100 Hz.
 const TELLING_SAMPLES: u64 = 1000;
-/// A line that explains less of the measured effort says nothing of its sign: a push may be stronger than the weight.
-/// Physical: above what the model and friction share with each other.
+/// Smallest explained fraction of the measured effort for which its sign is judged; a push may exceed gravity.
+/// Physical: above the correlation between model and friction.
 const TELLING: f64 = 0.7;
-/// A joint faster than this moves \[rad/s, m/s\].
+/// Velocity above which a joint is moving \[rad/s, m/s\].
 /// Physical: above the velocity noise of encoders.
 const MOVES: f64 = 0.03;
 
-/// Efforts that are away for so long have ceased \[ns\].
+/// Duration without efforts after which they are reported as ceased \[ns\].
 /// Physical: longer than a driver takes to switch a controller.
 const CEASED_NS: i64 = 3_000_000_000;
 
-/// A time without measured efforts, after there were some.
+/// Interval without measured efforts, after the first ones.
 #[derive(Debug, Clone, Copy, Default)]
 struct Without {
     /// Stamp of the newest measured effort \[ns\].
     since_ns: Option<i64>,
-    /// How long there has been none \[ns\].
+    /// Duration without efforts so far \[ns\].
     lasts_ns: i64,
-    /// The longest such time: when it began, and how long it took \[ns\].
+    /// The longest such interval, as (start, duration) \[ns\].
     longest: (i64, i64),
 }
 
 impl Without {
-    /// Takes a sample; tells whether efforts have just ceased.
+    /// Adds a sample; returns whether efforts have just ceased.
     fn add(&mut self, sample: &TwinState) -> bool {
         let stamp_ns = sample.header.stamp_ns;
         if sample.header.has(flags::EFFORT_MEASURED) {
@@ -54,24 +54,24 @@ impl Without {
     }
 }
 
-/// Follows the samples of a twin.
+/// Plausibility check of the samples of a twin.
 #[derive(Debug)]
 pub struct PlausibleTwin {
     names: Vec<String>,
     calibration: Calibration,
-    /// Whether measured and expected effort are in one unit.
+    /// Whether measured and expected effort have the same unit.
     is_alike: bool,
     filters: Filters,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
     without_effort: Without,
-    /// Steps without pauses, and how long they are together \[ns\].
+    /// Number of sample periods without pauses, and their total duration \[ns\].
     steps: u64,
     steps_ns: i64,
 }
 
 impl PlausibleTwin {
-    /// Nothing seen yet, of a twin with this configuration and correction.
+    /// Creates the check of a twin with this configuration and correction.
     pub fn new(config: &tauscope_twin::Config, model: Option<&TwinFile>, cell: &Cell) -> Self {
         let facts = &cell.facts;
         let in_nm =
@@ -89,7 +89,7 @@ impl PlausibleTwin {
         }
     }
 
-    /// Takes a sample; tells whether the efforts have just ceased, which is worth a look at once.
+    /// Adds a sample; returns whether the efforts have just ceased, which is reported at once.
     pub fn add(&mut self, sample: &TwinState) -> bool {
         let stamp_ns = sample.header.stamp_ns;
         self.first_ns.get_or_insert(stamp_ns);
@@ -101,7 +101,7 @@ impl PlausibleTwin {
                 self.steps_ns += step_ns;
             }
         }
-        // A standing arm bends where it is pushed: its effort then says nothing of its weight.
+        // A pushed arm at rest deflects, so its effort does not reflect gravity alone.
         let velocities = &sample.velocity[..self.names.len()];
         if velocities.iter().any(|velocity| velocity.abs() > MOVES) {
             self.calibration.add(sample);
@@ -114,7 +114,7 @@ impl PlausibleTwin {
         (self.steps > 0).then(|| self.steps as f64 / (self.steps_ns as f64 * 1e-9))
     }
 
-    /// What is odd so far.
+    /// Irregularities so far.
     pub fn oddities(&self) -> Vec<String> {
         let rate_hz = self.rate_hz().into_iter();
         let cutoffs = rate_hz.flat_map(|rate_hz| cutoffs_above_half(self.filters, rate_hz));
@@ -124,13 +124,13 @@ impl PlausibleTwin {
                 joints.join(", ")
             ),
             ScaleFault::WrongUnit { slope } | ScaleFault::NoCurrent { slope } => format!(
-                "the measured effort is {slope:.3} times what the twin expects: its unit is another than the twin's"
+                "the measured effort is {slope:.3} times the twin's expected effort: its unit differs from the twin's"
             ),
         });
         cutoffs.chain(scale).chain(self.ceased()).collect()
     }
 
-    /// What to say of the longest time without efforts.
+    /// Message about the longest interval without efforts.
     fn ceased(&self) -> Option<String> {
         let (since_ns, lasts_ns) = self.without_effort.longest;
         let at_s = (since_ns - self.first_ns?) as f64 * 1e-9;
@@ -160,7 +160,7 @@ impl PlausibleTwin {
     }
 }
 
-/// What to say of a low-pass called `name` that passes everything at this rate, and the remedy.
+/// Message and remedy for a low-pass called `name` that has no effect at this rate.
 pub fn cutoff_above_half(name: &str, cutoff_hz: f64, rate_hz: f64) -> Option<(String, String)> {
     (cutoff_hz > rate_hz / 2.0).then(|| {
         let title = format!(
@@ -171,7 +171,7 @@ pub fn cutoff_above_half(name: &str, cutoff_hz: f64, rate_hz: f64) -> Option<(St
     })
 }
 
-/// What to say of a twin's low-passes at this rate.
+/// Messages about a twin's low-passes without effect at this rate.
 pub fn cutoffs_above_half(filters: Filters, rate_hz: f64) -> impl Iterator<Item = String> {
     let all = [
         ("`velocity_cutoff_hz`", filters.velocity_cutoff_hz),
@@ -183,7 +183,7 @@ pub fn cutoffs_above_half(filters: Filters, rate_hz: f64) -> impl Iterator<Item 
     })
 }
 
-/// Joint states per second on the topic `state` of a recording, as far as its index tells.
+/// Rate of joint states on the topic `state` of a recording \[Hz\], from its index.
 ///
 /// # Errors
 /// If there is no such topic.

@@ -1,4 +1,4 @@
-//! A source and a twin of a run that say what cannot be in their samples, once for each thing, while they come.
+//! Source and twin wrappers of a run that warn once about each implausibility in their samples.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -11,14 +11,14 @@ use tauscope_session::{Finding, Plausible};
 
 use super::PlausibleTwin;
 
-/// When the first look is taken \[ns of stream time\]; each next one after twice the time.
-/// Physical: a person who watches the start still sits there after three seconds.
+/// Time of the first check \[ns of stream time\]; the interval doubles for each further check.
+/// Physical: a person who watches the start is still present after three seconds.
 const FIRST_LOOK_NS: i64 = 3_000_000_000;
-/// Looks are at most so far apart \[ns\].
-/// Resolution: a look costs microseconds.
+/// Longest interval between checks \[ns\].
+/// Resolution: a check costs microseconds.
 const LONGEST_NS: i64 = 60_000_000_000;
 
-/// When to look, and what was told.
+/// Schedule of the checks, and the warnings already issued.
 #[derive(Debug, Default)]
 struct Told {
     next_ns: Option<i64>,
@@ -27,10 +27,10 @@ struct Told {
 }
 
 impl Told {
-    /// Whether it is time for a look.
+    /// Whether a check is due.
     fn is_time(&mut self, stamp_ns: i64) -> bool {
         let next_ns = *self.next_ns.get_or_insert(stamp_ns + FIRST_LOOK_NS);
-        // A clock that was set back must not keep it from looking.
+        // A clock that was set back must not suspend the checks.
         if (next_ns - LONGEST_NS..next_ns).contains(&stamp_ns) {
             return false;
         }
@@ -46,7 +46,7 @@ impl Told {
     }
 }
 
-/// A source that says what is odd about its joint states.
+/// A source that warns about irregularities of its joint states.
 pub struct Watched<S> {
     stage: String,
     inner: S,
@@ -66,7 +66,7 @@ impl<S> Watched<S> {
     }
 }
 
-/// Hands on, and shows to `see` what was written.
+/// Forwards samples and passes each one to `see`.
 struct Seen<'a, T> {
     out: &'a mut dyn Emit<T>,
     see: &'a mut dyn FnMut(&T),
@@ -89,7 +89,7 @@ impl<S: Source<JointState>> Source<JointState> for Watched<S> {
             plausible.add(sample);
             if told.is_time(sample.header.stamp_ns) {
                 let findings = plausible.findings().into_iter();
-                // A pause is reported where it is noticed.
+                // Pauses are reported elsewhere, when they are noticed.
                 for finding in findings.filter(|it| !matches!(it, Finding::Pause { .. })) {
                     told.warn(stage, finding.subject(), &finding.to_string());
                 }
@@ -111,7 +111,7 @@ impl<S: Source<JointState>> Source<JointState> for Watched<S> {
     }
 }
 
-/// A twin that says what is odd about measured and expected effort.
+/// A twin that warns about irregularities of measured and expected effort.
 pub struct WatchedTwin<S> {
     stage: String,
     inner: S,
@@ -140,7 +140,7 @@ impl<S> WatchedTwin<S> {
             let have_ceased = plausible.add(sample);
             if told.is_time(sample.header.stamp_ns) || have_ceased {
                 for text in plausible.oddities() {
-                    // The words, without the numbers that go on changing.
+                    // The text without its numbers, which change from check to check.
                     let key = text.replace(|c: char| c.is_ascii_digit() || c == '.', "");
                     told.warn(stage, key, &text);
                 }

@@ -1,49 +1,49 @@
-//! Why a replay cannot be, or was not brought to its end.
+//! Errors of a replay.
 
 use crate::build;
 
-/// Why a replay cannot be, or was not brought to its end.
+/// Error that prevents or ends a replay.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
-    /// The pipeline has no source whose place a recording could take.
+    /// A pipeline without a source that a recording could replace.
     #[error("the pipeline has no `ingest` stage in whose place the recording could be read")]
     NoSource,
-    /// It has several.
+    /// A pipeline with several sources.
     #[error("the pipeline reads {}: choose one with --source", stages.join(", "))]
     ManySources {
-        /// They.
+        /// The sources.
         stages: Vec<String>,
     },
-    /// There is no such source.
+    /// A source that the pipeline does not have.
     #[error("the pipeline has no source named `{name}`; there is {known}")]
     UnknownSource {
-        /// What was asked for.
+        /// The requested name.
         name: String,
-        /// What there is.
+        /// The existing sources.
         known: String,
     },
-    /// The recording cannot be read.
+    /// An unreadable recording.
     #[error(transparent)]
     Ingest(#[from] tauscope_ingest::IngestError),
-    /// A stage cannot be built.
+    /// A stage that cannot be built.
     #[error(transparent)]
     Build(#[from] build::BuildError),
-    /// What is written cannot be.
+    /// Output that cannot be written.
     #[error(transparent)]
     Record(#[from] tauscope_record::RecordError),
-    /// A stage failed on the way.
+    /// A stage that failed during the replay.
     #[error(transparent)]
     Stage(#[from] tauscope_bus::StageError),
-    /// A link failed.
+    /// A failed link.
     #[error(transparent)]
     Link(#[from] tauscope_bus::LinkError),
-    /// Whoever asked for it does not want it any more.
+    /// Cancellation by the caller.
     #[error("interrupted")]
     Interrupted,
 }
 
 impl ReplayError {
-    /// Whether the arguments or files are wrong (exit code 2), rather than what happened since.
+    /// Whether the error is in the arguments or input files (exit code 2).
     pub fn is_input(&self) -> bool {
         match self {
             Self::Ingest(error) => error.is_input(),

@@ -1,4 +1,4 @@
-//! A sink that listens to all twins and detectors of a replay and tallies what they say.
+//! A sink that collects statistics of all twins and detectors of a replay.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -13,27 +13,27 @@ use tauscope_session::{Finding, Plausible};
 use crate::plausible::{self, PlausibleTwin};
 use crate::tally::{DetectionTally, TwinTally};
 
-/// What was observed.
+/// Statistics of a replay.
 #[derive(Debug, Clone, Default)]
 pub struct Observed {
-    /// By twin stage.
+    /// Residual sums by twin stage.
     pub twins: BTreeMap<String, TwinTally>,
-    /// By detect stage.
+    /// Events by detect stage.
     pub detectors: BTreeMap<String, DetectionTally>,
-    /// First and newest stamp of all \[ns\].
+    /// First and latest stamp \[ns\].
     pub stamps_ns: Option<(i64, i64)>,
-    /// What cannot be, or is odd, a line each; known at the end.
+    /// Implausibilities and irregularities, a line each; complete at the end.
     pub notes: Vec<String>,
 }
 
 impl Observed {
-    /// Puts the findings of the source before what else is odd.
+    /// Inserts the findings of the source before the other notes.
     pub fn note(&mut self, findings: &[Finding]) {
         let sentences = findings.iter().map(ToString::to_string);
         self.notes.splice(0..0, sentences);
     }
 
-    /// What came of the replay of one recording.
+    /// Converts to the result of the replay of one recording.
     pub fn into_outcome(
         self,
         cell: &Cell,
@@ -64,14 +64,14 @@ impl Observed {
 pub struct Observer {
     joint_names: Vec<String>,
     plausible: Plausible,
-    /// By twin stage.
+    /// Plausibility checks by twin stage.
     plausible_twins: BTreeMap<String, PlausibleTwin>,
-    /// What it has seen so far.
+    /// Statistics so far.
     pub observed: Observed,
 }
 
 impl Observer {
-    /// An observer of `cell`, with these twins.
+    /// Creates an observer of `cell` with these twins.
     pub fn new(cell: &Cell, plausible_twins: BTreeMap<String, PlausibleTwin>) -> Self {
         Self {
             joint_names: cell.facts.joint_names.clone(),
@@ -123,7 +123,7 @@ impl Sink for &mut Observer {
     fn finish(&mut self) -> Result<(), StageError> {
         let findings = self.plausible.findings().into_iter();
         let mut notes: Vec<String> = findings.map(|finding| finding.to_string()).collect();
-        // Twins behind one source find the same.
+        // Twins behind one source report the same irregularities.
         for note in self
             .plausible_twins
             .values()

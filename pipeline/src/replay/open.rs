@@ -1,4 +1,4 @@
-//! A recording in the place of a pipeline's own source.
+//! A recording as the source of a pipeline.
 
 use std::path::Path;
 
@@ -10,8 +10,8 @@ use tauscope_ingest::{
 use crate::build;
 use crate::cell::Cell;
 
-/// Opens it, not paced, with a handle to the findings about it. Of a table the pipeline may give the columns; else its
-/// header does, or a file next to it.
+/// Opens a recording without pacing, with a handle to its findings. The columns of a table come from the pipeline,
+/// else from its header or from a file next to it.
 pub(super) fn recording(
     config: &Config,
     recording: &Path,
@@ -44,10 +44,10 @@ pub(super) fn recording(
     Ok((Box::new(ahead), findings))
 }
 
-/// The pipeline's topics, for a recording of its robot.
+/// File settings of a recording with the pipeline's topics.
 pub(super) fn file_config(config: &Config, recording: &Path) -> FileConfig {
     let topics = config.source().ok().and_then(|(_, source)| source.topics());
-    // What a simulated cell was asked for is in its archive, too.
+    // The archive of a simulated cell also contains the requests to learn.
     let simulated = || Topics {
         learn: Some("/learn".to_owned()),
         ..Topics::default()

@@ -1,11 +1,11 @@
-//! Where the recorders of a pipeline write in a replay.
+//! Output paths of a pipeline's recorders in a replay.
 
 use std::path::{Path, PathBuf};
 
 use tauscope_record::{Existing, FileName};
 
-/// A recorder's configuration for a replay: the same kinds of file, into `out`, named after the
-/// recording; no live picture. Nothing if there is no `out`.
+/// A recorder's configuration for a replay: the same kinds of file, written to `out` and named after the recording,
+/// without live picture. `None` without `out`.
 pub(super) fn redirect(
     config: &tauscope_record::Config,
     out: Option<&Path>,
@@ -14,11 +14,11 @@ pub(super) fn redirect(
 ) -> Option<tauscope_record::Config> {
     let out = out?;
     let mut config = tauscope_record::Config {
-        // One result for each recording, again and again.
+        // Each replay replaces the result of the recording.
         split: None,
         keep: None,
         existing: Existing::Replace,
-        // What is lost in a power cut is replayed again.
+        // Files lost in a power failure can be replayed again.
         sync_s: 0.0,
         ..config.clone()
     };

@@ -1,4 +1,4 @@
-//! Two results over the same recordings: which events appeared, vanished and moved.
+//! Comparison of two results over the same recordings: events that appeared, vanished or moved.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::read::{EventRow, RecordingRow, Results};
 
-/// What became of an event from the first result to the second.
+/// Change of an event from the first result to the second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Change {
@@ -14,12 +14,12 @@ pub enum Change {
     Appeared,
     /// Only the first result has it.
     Vanished,
-    /// Both have it, with another time, kind, link or joints.
+    /// Both results have it, with different time, kind, link or joints.
     Moved,
 }
 
 impl Change {
-    /// In words.
+    /// Name of the change.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Appeared => "appeared",
@@ -29,33 +29,33 @@ impl Change {
     }
 }
 
-/// An event as one result has it.
+/// An event in one result.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Told {
-    /// The stage that told it.
+    /// The stage that reported it.
     pub stage: String,
     /// Its detector.
     pub detector: String,
     /// `contact`, `collision`, …, or the effect of a change of the arm.
     pub kind: String,
-    /// The touched or changed link, where estimated.
+    /// The touched or changed link, if estimated.
     pub link: Option<String>,
     /// The joints that detected.
     pub joints: Vec<String>,
-    /// Stamp of the sample that raised the alarm, from the first sample of the recording on \[s\].
+    /// Stamp of the sample that raised the alarm, relative to the recording's first sample \[s\].
     pub t_s: f64,
     /// Stamp of the sample that ended it \[s\].
     pub t_off_s: f64,
     /// The largest score.
     pub peak_score: Option<f64>,
-    /// Force on the robot, world frame \[N\], where estimated.
+    /// Force on the robot in the world frame, if estimated \[N\].
     pub force_n: Option<[f64; 3]>,
 }
 
-/// An event that is not the same in both results.
+/// An event that differs between the results.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Difference {
-    /// What became of it.
+    /// Kind of the difference.
     pub change: Change,
     /// The cell.
     pub cell: String,
@@ -63,32 +63,32 @@ pub struct Difference {
     pub recording: String,
     /// SHA-256 of the recording.
     pub recording_sha256: String,
-    /// The part of the recording to look at: from the estimated beginning to the end, in either result \[ns since the
+    /// The relevant part of the recording: from the earliest estimated beginning to the latest end \[ns since the
     /// epoch\].
     pub window_ns: (i64, i64),
-    /// As the first result has it.
+    /// The event in the first result.
     pub a: Option<Told>,
-    /// As the second result has it.
+    /// The event in the second result.
     pub b: Option<Told>,
 }
 
 impl Difference {
-    /// As the newer result that has it tells it.
+    /// The event in the newer result that has it.
     fn told(&self) -> Option<&Told> {
         self.b.as_ref().or(self.a.as_ref())
     }
 
-    /// The link of the newer result that has the event; empty where none was estimated.
+    /// The link in the newer result that has the event; empty if none was estimated.
     pub fn link(&self) -> &str {
         self.told().and_then(|t| t.link.as_deref()).unwrap_or("")
     }
 
-    /// The joints of the newer result that has the event.
+    /// The joints in the newer result that has the event.
     pub fn joints(&self) -> &[String] {
         self.told().map_or(&[], |told| &told.joints)
     }
 
-    /// What moved, in words; empty for an event that only one result has.
+    /// The differences in words; empty for an event that only one result has.
     pub fn what_moved(&self) -> Vec<String> {
         let (Some(a), Some(b)) = (&self.a, &self.b) else {
             return Vec::new();
@@ -108,14 +108,14 @@ impl Difference {
     }
 }
 
-/// How many events of one place are not the same.
+/// Numbers of differing events of a cell, link or joint.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
     /// Only in the second result.
     pub appeared: usize,
     /// Only in the first.
     pub vanished: usize,
-    /// In both, and not the same.
+    /// In both, but different.
     pub moved: usize,
 }
 
@@ -129,28 +129,28 @@ impl Counts {
     }
 }
 
-/// Two results beside each other.
+/// Comparison of two results.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Recordings that both results have.
+    /// Number of recordings that both results have.
     pub recordings: usize,
-    /// Names of those that only the first has.
+    /// Names of recordings that only the first result has.
     pub only_in_a: Vec<String>,
-    /// Names of those that only the second has.
+    /// Names of recordings that only the second result has.
     pub only_in_b: Vec<String>,
-    /// Events of the first result in recordings that both have.
+    /// Number of events of the first result in common recordings.
     pub events_a: usize,
-    /// Events of the second.
+    /// Number of events of the second result in common recordings.
     pub events_b: usize,
-    /// Events that are the same.
+    /// Number of equal events.
     pub same: usize,
-    /// By cell.
+    /// Differences by cell.
     pub cells: BTreeMap<String, Counts>,
-    /// By cell and link; the link is empty where none was estimated.
+    /// Differences by cell and link; the link is empty if none was estimated.
     pub links: BTreeMap<String, BTreeMap<String, Counts>>,
-    /// By cell and joint; an event counts for each joint that detected it.
+    /// Differences by cell and joint; an event counts for each joint that detected it.
     pub joints: BTreeMap<String, BTreeMap<String, Counts>>,
-    /// The events that are not the same, by cell, recording and time.
+    /// The differing events, ordered by cell, recording and time.
     pub differences: Vec<Difference>,
 }
 
@@ -162,16 +162,16 @@ pub struct Comparison {
 pub struct Ambiguous {
     /// `A` or `B`.
     pub result: &'static str,
-    /// Which recording.
+    /// The recording.
     pub recording: String,
 }
 
-/// Compares `b` with `a`. Events pair where their times overlap or are no more than `tolerance_s` apart, those of one
-/// stage with each other, and those of stages that only one result has among themselves. A pair whose alarms are
-/// further apart than that, or of another kind, link or joints, has moved.
+/// Compares `b` with `a`. Events form a pair if their times overlap or are at most `tolerance_s` apart. Events of a
+/// stage that both results have pair within this stage; events of all other stages pair with each other. A pair has
+/// moved if its alarms are further apart than `tolerance_s`, or if kind, link or joints differ.
 ///
 /// # Errors
-/// If a result has a recording twice.
+/// If a result contains a recording twice.
 pub fn compare(a: &Results, b: &Results, tolerance_s: f64) -> Result<Comparison, Ambiguous> {
     let (of_a, of_b) = (by_recording(a, "A")?, by_recording(b, "B")?);
     let only = |of: &BTreeMap<&str, _>, other: &BTreeMap<&str, (&RecordingRow, Vec<&EventRow>)>| {
@@ -241,7 +241,7 @@ fn by_recording<'a>(
 
 type Pair<'a> = (Option<&'a EventRow>, Option<&'a EventRow>);
 
-/// Each event once: with the other result's that it belongs to, or alone. The closest alarms pair first.
+/// Pairs each event with at most one event of the other result; the closest alarms pair first.
 fn pairs<'a>(
     a: &[&'a EventRow],
     b: &[&'a EventRow],

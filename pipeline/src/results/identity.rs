@@ -1,4 +1,4 @@
-//! What the result of a replay depends on, and the name that follows from it.
+//! Inputs of a replay's result, and the file name derived from them.
 
 use std::collections::BTreeMap;
 
@@ -9,18 +9,19 @@ use crate::replay::{TwinChoice, stem};
 use crate::report::{Problem, Report};
 use crate::settings::Settings;
 
-/// Version of the rows in a result; a change of their columns or meaning makes new names.
+/// Version of the rows in a result. A change of their columns or meaning needs a new version, which changes all
+/// names.
 const FORMAT: &str = "tauscope-result/1";
 
-/// All that the results of a pipeline depend on, but for the recording.
+/// All inputs of a pipeline's results, except the recording.
 #[derive(Debug, Clone)]
 pub struct Identity {
     facts: BTreeMap<String, String>,
 }
 
 impl Identity {
-    /// Of the results of `pipeline`: its text, the URDFs, the twins, what detectors have learnt, their weights, and the
-    /// version of this program. `with_scores` says whether there is a row for each judged sample.
+    /// Collects the inputs of `pipeline`: its text, the URDFs, the twins, the detectors' learnt parameters and
+    /// weights, and the version of this program. `with_scores` adds a row for each judged sample.
     ///
     /// # Errors
     /// If the file of a trained detector cannot be read.
@@ -33,7 +34,7 @@ impl Identity {
             let Settings::Detect { config, .. } = &stage.settings else {
                 continue;
             };
-            // Where its files lie does not matter, what is in them does.
+            // The identity depends on the content of the files, not on their paths.
             let mut config = config.clone();
             for (name, path) in config.trained_files_mut() {
                 let hash = sha256_of_file(path)
@@ -41,7 +42,7 @@ impl Identity {
                 facts.insert(format!("stages/{}/{name}/weights_sha256", stage.name), hash);
                 path.clear();
             }
-            // A replay neither reads nor writes it.
+            // A replay neither reads nor writes the state file.
             if let Some(path) = config.state_mut() {
                 path.clear();
             }
@@ -55,7 +56,7 @@ impl Identity {
         Ok(Self { facts })
     }
 
-    /// All that the result of `wanted` depends on, by name.
+    /// All inputs of the result of `wanted`, by name.
     pub fn facts(&self, wanted: &Wanted) -> BTreeMap<String, String> {
         let mut facts = self.facts.clone();
         facts.insert("recording".to_owned(), stem(&wanted.recording));
@@ -66,17 +67,17 @@ impl Identity {
         facts
     }
 
-    /// The name of the result of `wanted`, 64 hexadecimal digits: SHA-256 over [`facts`](Self::facts).
+    /// Key of the result of `wanted`, 64 hexadecimal digits: SHA-256 over [`facts`](Self::facts).
     pub fn key(&self, wanted: &Wanted) -> String {
         hash(&self.facts(wanted))
     }
 
-    /// SHA-256 over all that results depend on but for the recording: runners with the same hash give the same results.
+    /// SHA-256 over all inputs except the recording. Runners with the same hash give the same results.
     pub fn hash(&self) -> String {
         hash(&self.facts)
     }
 
-    /// Where the result of `wanted`, recorded in `cell`, lies: `cell=CELL/day=YYYY-MM-DD/KEY.parquet`. The day is that of
+    /// Path of the result of `wanted`, recorded in `cell`: `cell=CELL/day=YYYY-MM-DD/KEY.parquet`. The day is that of
     /// the recording's first message, in UTC.
     pub fn name(&self, wanted: &Wanted, cell: &str) -> String {
         let day = jiff::Timestamp::from_nanosecond(i128::from(wanted.start_ns)).map_or_else(

@@ -1,4 +1,4 @@
-//! A manifest: which recordings are wanted, a line of JSON each.
+//! A manifest: the recordings to replay, a line of JSON each.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::provenance::sha256_of_file;
 use crate::report::{Problem, Report, Source};
 
-/// A recording that is wanted: a line of a manifest.
+/// A recording to replay: a line of a manifest.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wanted {
@@ -15,20 +15,20 @@ pub struct Wanted {
     pub recording: PathBuf,
     /// SHA-256 of the file, or of all files of a bag's folder in the order of their names.
     pub sha256: String,
-    /// Their size.
+    /// Size of the files \[bytes\].
     pub bytes: u64,
     /// Log time of the first message \[ns since the epoch\].
     pub start_ns: i64,
-    /// The `ingest` stage whose place it takes, where the pipeline has several.
+    /// The `ingest` stage that the recording replaces, if the pipeline has several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
 }
 
 impl Wanted {
-    /// What `recording` holds by now; its path as it is given.
+    /// Describes the current content of `recording`; the path is kept as given.
     ///
     /// # Errors
-    /// In words, if it is no recording, is empty, or cannot be read.
+    /// A message if it is no recording, is empty, or cannot be read.
     pub fn of(recording: &Path, source: Option<&str>) -> Result<Self, String> {
         let opened = tauscope_session::open(recording).map_err(|error| error.to_string())?;
         let start_ns = opened.start_ns().ok_or("it holds no message")?;
@@ -42,7 +42,7 @@ impl Wanted {
         })
     }
 
-    /// Whether the recording is still what the manifest says.
+    /// Whether the recording still has the hash of the manifest.
     ///
     /// # Errors
     /// If it cannot be read.
@@ -51,10 +51,10 @@ impl Wanted {
     }
 }
 
-/// Which recordings are wanted.
+/// The recordings to replay.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Manifest {
-    /// In the order of the file, paths resolved.
+    /// The recordings in the order of the file, with resolved paths.
     pub wanted: Vec<Wanted>,
 }
 
@@ -62,7 +62,7 @@ impl Manifest {
     /// Reads the manifest at `path`. Empty lines are left out.
     ///
     /// # Errors
-    /// Everything that is wrong, each with its line.
+    /// All problems, each with its line.
     pub fn load(path: &Path) -> Result<Self, Report> {
         let text = std::fs::read_to_string(path)
             .map_err(|error| Problem::of_file(path, error.to_string()))?;
@@ -98,10 +98,10 @@ impl Manifest {
         report.into_result(Self { wanted })
     }
 
-    /// As the file that [`load`](Self::load) reads; each path relative to `folder` where the recording lies below it.
+    /// Formats the file that [`load`](Self::load) reads. Paths of recordings below `folder` are relative to it.
     ///
     /// # Errors
-    /// If a path is no text.
+    /// If a path is not valid UTF-8.
     pub fn to_text(&self, folder: &Path) -> serde_json::Result<String> {
         let mut text = String::new();
         for one in &self.wanted {
@@ -116,7 +116,7 @@ impl Manifest {
         Ok(text)
     }
 
-    /// Every `of`-th recording, from the one at `index` on, counted from 0.
+    /// Keeps every `of`-th recording, starting at `index`, counted from 0.
     #[must_use]
     pub fn shard(mut self, index: usize, of: usize) -> Self {
         let mut place = 0;
@@ -152,7 +152,7 @@ mod tests {
         std::fs::write(&path, all.to_text(Path::new("/archive")).unwrap()).unwrap();
         let read = Manifest::load(&path).unwrap();
         assert_eq!(read.wanted[3].recording, folder.path().join("day/3.mcap"));
-        // Every recording is in one shard.
+        // Every recording is in exactly one shard.
         let mut stamps: Vec<i64> = (0..3)
             .flat_map(|index| read.clone().shard(index, 3).wanted)
             .map(|one| one.start_ns)

@@ -1,4 +1,4 @@
-//! Results read back: what was found in which recording.
+//! Reading of results: recordings and their events.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -29,10 +29,10 @@ const READ: [&str; 16] = [
     "stage",
 ];
 
-/// Why results cannot be read.
+/// Error while reading results.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// A file or folder cannot be read.
+    /// An unreadable file or folder.
     #[error("{}: {source}", path.display())]
     Io {
         /// Which.
@@ -40,7 +40,7 @@ pub enum ReadError {
         /// Why.
         source: std::io::Error,
     },
-    /// A file is no Parquet.
+    /// A file that is not Parquet.
     #[error("{}: {source}", path.display())]
     Parquet {
         /// Which.
@@ -48,12 +48,12 @@ pub enum ReadError {
         /// Why.
         source: parquet::errors::ParquetError,
     },
-    /// A file holds another table.
+    /// A file with another table.
     #[error("{}: it is no result of `tauscope replay --manifest`: it has no column `{column}`", path.display())]
     NoColumn {
         /// Which.
         path: PathBuf,
-        /// What it has not.
+        /// The missing column.
         column: &'static str,
     },
 }
@@ -63,7 +63,7 @@ pub enum ReadError {
 pub struct RecordingRow {
     /// Its name.
     pub recording: String,
-    /// SHA-256 of what is in it.
+    /// SHA-256 of its content.
     pub sha256: String,
     /// The cell.
     pub cell: String,
@@ -76,13 +76,13 @@ pub struct RecordingRow {
 pub struct EventRow {
     /// SHA-256 of the recording.
     pub sha256: String,
-    /// The stage that told it.
+    /// The stage that reported it.
     pub stage: String,
     /// Its detector.
     pub detector: String,
     /// `contact`, `collision`, …, or the effect of a change.
     pub kind: String,
-    /// The touched or changed link, where estimated.
+    /// The touched or changed link, if estimated.
     pub link: Option<String>,
     /// The joints that detected.
     pub joints: Vec<String>,
@@ -94,20 +94,20 @@ pub struct EventRow {
     pub contact_ns: i64,
     /// The largest score.
     pub peak_score: Option<f64>,
-    /// Force on the robot, world frame \[N\], where estimated.
+    /// Force on the robot in the world frame, if estimated \[N\].
     pub force_n: Option<[f64; 3]>,
 }
 
-/// What was found in which recording.
+/// Content of result files.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Results {
-    /// By file.
+    /// Recordings, one per file.
     pub recordings: Vec<RecordingRow>,
     /// All events.
     pub events: Vec<EventRow>,
 }
 
-/// The Parquet files below a folder, by name, or the one file.
+/// Lists the Parquet files below a folder, sorted by name; for a file, the file itself.
 ///
 /// # Errors
 /// If the folder cannot be read.
@@ -138,7 +138,7 @@ pub fn parquet_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
 /// Reads the recordings and events of these files; rows of single samples are skipped.
 ///
 /// # Errors
-/// If a file cannot be read or is none of ours.
+/// If a file cannot be read or is not a result.
 pub fn read_results(files: &[PathBuf]) -> Result<Results, ReadError> {
     let mut results = Results::default();
     for path in files {
@@ -179,7 +179,7 @@ fn read_file(path: &Path, results: &mut Results) -> Result<(), ReadError> {
     Ok(())
 }
 
-/// Whether a group holds nothing but rows of samples, by the statistics of its column `row`.
+/// Whether a row group holds rows of samples only, by the statistics of its column `row`.
 fn is_samples(statistics: Option<&Statistics>) -> bool {
     let bounds = statistics.map(|s| (s.min_bytes_opt(), s.max_bytes_opt()));
     bounds.is_some_and(|(min, max)| min == Some(b"detection") && max == Some(b"detection"))

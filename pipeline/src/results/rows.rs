@@ -1,7 +1,7 @@
-//! The rows of a result, and the file they are written to.
+//! Rows of a result, and their file.
 //!
-//! One table for all kinds of rows, which the column `row` tells; what a kind has not is null and costs nothing.
-//! `docs/results.md` describes it.
+//! One table holds all kinds of rows; the column `row` names the kind. Columns that a kind does not have are null and
+//! take no space. `docs/results.md` describes the table.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -19,11 +19,11 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use tauscope_bus::{Detection, SampleRef, Sink, StageError, flags};
 
-/// Rows in memory before they are written as a row group.
+/// Number of rows that are buffered and written as a row group.
 /// Resolution: 40 MB of memory at most, against groups too small to compress well.
 const GROUP_ROWS: usize = 65_536;
 
-/// What a column holds.
+/// Data type of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Text,
@@ -34,7 +34,7 @@ enum Kind {
     Flag,
 }
 
-/// The columns in their order: name, and what it holds.
+/// Name and data type of the columns, in order.
 const KINDS: [(&str, Kind); 31] = [
     ("row", Kind::Text),
     ("recording", Kind::Text),
@@ -69,7 +69,7 @@ const KINDS: [(&str, Kind); 31] = [
     ("ready", Kind::Flag),
 ];
 
-/// The names of the columns, in their order.
+/// Names of the columns, in order.
 pub const COLUMNS: [&str; KINDS.len()] = {
     let mut names = [""; KINDS.len()];
     let mut n = 0;
@@ -80,7 +80,7 @@ pub const COLUMNS: [&str; KINDS.len()] = {
     names
 };
 
-/// The schema of every result.
+/// Arrow schema of every result.
 pub fn schema() -> Arc<Schema> {
     let fields = KINDS.map(|(name, kind)| {
         let data = match kind {
@@ -96,7 +96,7 @@ pub fn schema() -> Arc<Schema> {
     Arc::new(Schema::new(fields.to_vec()))
 }
 
-/// A row: what is told is set, the rest is null. The fields are the columns of `docs/results.md`.
+/// A row; unset fields are null. The fields are the columns of `docs/results.md`.
 #[derive(Debug, Clone, Copy, Default)]
 #[allow(missing_docs, reason = "docs/results.md has a line for each")]
 pub struct Row<'a> {
@@ -128,7 +128,7 @@ pub struct Row<'a> {
     pub ready: Option<bool>,
 }
 
-/// A column that grows.
+/// Builder of a column.
 enum Column {
     Text(StringBuilder),
     Texts(ListBuilder<StringBuilder>),
@@ -160,7 +160,7 @@ impl Column {
         }
     }
 
-    /// Appends a value of this column's kind.
+    /// Appends a value of this column's type.
     fn push(&mut self, value: &Value<'_>) {
         match (self, value) {
             (Self::Text(column), Value::Text(value)) => column.append_option(*value),
@@ -172,7 +172,7 @@ impl Column {
             }
             (Self::Stamp(column), Value::Stamp(value)) => column.append_option(*value),
             (Self::Count(column), Value::Count(value)) => column.append_option(*value),
-            // What cannot be told is null to every reader; not a number is so to some.
+            // All readers treat null as missing, but only some treat NaN so.
             (Self::Number(column), Value::Number(value)) => {
                 column.append_option(value.filter(|value| value.is_finite()));
             }
@@ -204,8 +204,8 @@ pub struct RowWriter {
 }
 
 impl RowWriter {
-    /// Writes into `file` what is said of a recording of this name and hash, made in `cell`. `facts` is what the result
-    /// depends on; it goes into the file's metadata.
+    /// Creates a writer into `file` for a recording with this name and hash, made in `cell`. `facts` are the inputs
+    /// of the result, which are stored in the file's metadata.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -280,7 +280,7 @@ impl RowWriter {
         Ok(())
     }
 
-    /// Writes the rows that wait as a row group of their own, so that readers of other rows skip it.
+    /// Writes the buffered rows as a separate row group, so that readers of other rows can skip it.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -295,7 +295,7 @@ impl RowWriter {
         self.writer.flush()
     }
 
-    /// Writes what waits and makes it outlast a power cut.
+    /// Writes the buffered rows and syncs the file to disk.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -307,7 +307,7 @@ impl RowWriter {
     }
 }
 
-/// A row for each sample of a detector.
+/// Writes a row for each sample of a detector.
 impl Sink for &mut RowWriter {
     fn accept(&mut self, from: &str, sample: SampleRef<'_>) -> Result<(), StageError> {
         let SampleRef::Detection(sample) = sample else {

@@ -1,4 +1,4 @@
-//! Where results are kept.
+//! Storage of results.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -8,58 +8,59 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use tauscope_archive::whole_file::{self, Existing};
 
-/// A place for whole files. A file that has its name is complete and never changes.
+/// A store of complete files. A file under its final name is complete and never changes.
 pub trait Shelf: Sync {
-    /// Whether `name` is there.
+    /// Whether the file `name` exists.
     ///
     /// # Errors
-    /// If that cannot be told.
+    /// If that cannot be determined.
     fn holds(&self, name: &str) -> io::Result<bool>;
 
-    /// A new file on this machine to write `name` into, which nobody else writes to.
+    /// Creates a local temporary file for the content of `name`, with this process as its only writer.
     ///
     /// # Errors
-    /// If it cannot be made.
+    /// If it cannot be created.
     fn begin(&self, name: &str) -> io::Result<(PathBuf, File)>;
 
-    /// Gives the finished `part` its name if nobody has done so before; `part` is gone then. Whether it was this one.
+    /// Moves the finished `part` to `name`, unless that file exists, and removes `part`. Returns whether it was
+    /// moved.
     ///
     /// # Errors
-    /// If it cannot be put there.
+    /// If it cannot be moved.
     fn place(&self, part: &Path, name: &str) -> io::Result<bool>;
 
-    /// Puts a small text there, whatever was there before.
+    /// Writes a small text file and replaces an existing one.
     ///
     /// # Errors
     /// If it cannot be written.
     fn put(&self, name: &str, text: &str) -> io::Result<()>;
 }
 
-/// What distinguishes the unfinished files of one process.
+/// Counter that makes the names of a process's unfinished files unique.
 static NUMBER: AtomicU64 = AtomicU64::new(0);
 
-/// A folder of this machine, or one that several machines share.
+/// A local folder, or one that several machines share.
 #[derive(Debug)]
 pub struct Folder {
     root: PathBuf,
-    /// Where files are until they are whole: no glob over the results finds them.
+    /// Folder of unfinished files, which no glob over the results matches.
     unfinished: PathBuf,
-    /// Different in every process, also in containers, where all have the number 1.
+    /// Random identifier of this process; process ids are not unique across containers.
     runner: String,
 }
 
 impl Folder {
-    /// Opens the folder, makes it where there is none, and removes what runners that have died left unfinished.
+    /// Opens the folder, creates it if missing, and removes unfinished files of crashed runners.
     ///
     /// # Errors
-    /// If it cannot be made or listed.
+    /// If it cannot be created or listed.
     pub fn open(root: &Path) -> io::Result<Self> {
         let unfinished = root.join("unfinished");
         whole_file::create_folder(&unfinished)?;
         for entry in fs::read_dir(&unfinished)? {
             let path = entry?.path();
-            // One that another runner finishes at this moment is none of ours. It is locked until it is gone, so that
-            // a runner that has just made it notices.
+            // A file that another runner still writes is locked and is left alone. The lock is held until the file is
+            // removed, so that a runner that has just created it notices.
             if let Ok(file) = File::open(&path)
                 && file.try_lock().is_ok()
             {
@@ -100,7 +101,7 @@ impl Shelf for Folder {
             if file.metadata()?.nlink() > 0 {
                 return Ok((part, file));
             }
-            // Before it was locked, a runner that begins took it for one of a dead runner.
+            // A starting runner removed the file before it was locked, as if its owner had crashed.
             let _ = whole_file::discard(&part);
         }
     }

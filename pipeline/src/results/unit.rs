@@ -1,4 +1,4 @@
-//! The unit of work: one recording to one file.
+//! Unit of work: from one recording to one result file.
 
 use tauscope_bus::Sink;
 use tauscope_watch as watch;
@@ -10,58 +10,58 @@ use super::shelf::Shelf;
 use crate::replay::{Outcome, Replay, ReplayError, stem};
 use crate::tally::{DetectionTally, Event};
 
-/// What became of a recording.
+/// Outcome for a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Done {
-    /// Its result was there already.
+    /// Its result existed already.
     Before,
-    /// It was replayed; so many samples were lost or refused.
+    /// It was replayed.
     Now {
-        /// See above.
+        /// Number of samples that were lost or refused.
         lost: u64,
     },
-    /// It was replayed, and another runner was faster.
+    /// It was replayed, but another runner finished first.
     ByAnother,
 }
 
-/// Why there is no result.
+/// Error that prevents a result.
 #[derive(Debug, thiserror::Error)]
 pub enum UnitError {
-    /// The recording cannot be read.
+    /// An unreadable recording.
     #[error("cannot read it: {0}")]
     Read(std::io::Error),
-    /// It is not what the manifest says.
+    /// A recording that has changed since the manifest was made.
     #[error("it has changed since the manifest was made: make the manifest again")]
     Changed,
-    /// It cannot be replayed.
+    /// A failed replay.
     #[error(transparent)]
     Replay(#[from] ReplayError),
-    /// The result cannot be encoded or written.
+    /// A result that cannot be encoded or written.
     #[error("cannot write its result: {0}")]
     Parquet(#[from] parquet::errors::ParquetError),
-    /// The result cannot be put in place.
+    /// A result that cannot be moved to its place.
     #[error("cannot put its result in place: {0}")]
     Place(std::io::Error),
 }
 
-/// Replays recordings of one source into a shelf.
+/// Replays recordings of one source and stores the results.
 pub struct Unit<'a> {
-    /// The pipeline.
+    /// The prepared replay.
     pub replay: &'a Replay<'a>,
-    /// What results depend on.
+    /// Inputs of the results.
     pub identity: &'a Identity,
-    /// Where they go.
+    /// Store of the results.
     pub shelf: &'a dyn Shelf,
-    /// Also a row for each sample of a detector.
+    /// Whether to write a row for each sample of a detector.
     pub with_scores: bool,
 }
 
 impl Unit<'_> {
-    /// Makes the result of `wanted`, unless it is there. `progress` is told how far it is, 0 to 1, and by returning
-    /// `false` ends the work.
+    /// Computes the result of `wanted`, unless it exists. `progress` receives the completed fraction, 0 to 1; if it
+    /// returns `false`, the work is cancelled.
     ///
     /// # Errors
-    /// If the recording cannot be read or is another one by now, or the result cannot be written.
+    /// If the recording cannot be read or has changed, or the result cannot be written.
     pub fn run(
         &self,
         wanted: &Wanted,
@@ -79,7 +79,7 @@ impl Unit<'_> {
         let outcome = match written {
             Ok(outcome) => outcome,
             Err(error) => {
-                // Why there is no result is what the caller is told.
+                // The caller receives the original error, not one of the cleanup.
                 let _ = tauscope_archive::whole_file::discard(&part);
                 return Err(error);
             }
@@ -119,7 +119,7 @@ impl Unit<'_> {
     }
 }
 
-/// What is said of the recording as a whole, of its twins and joints, and of each event.
+/// Writes the rows of the recording, of its twins by joint, and of each event.
 fn summarise(outcome: &Outcome, rows: &mut RowWriter) -> Result<(), parquet::errors::ParquetError> {
     let (start_ns, end_ns) = outcome.stamps_ns;
     let events = |watches: bool| {
@@ -171,7 +171,7 @@ fn summarise(outcome: &Outcome, rows: &mut RowWriter) -> Result<(), parquet::err
 }
 
 fn of_event<'a>(tally: &'a DetectionTally, event: &'a Event, effort_unit: &'a str) -> Row<'a> {
-    // Nothing was counted without a first sample.
+    // Without a first sample there are no events.
     let start_ns = tally.start_ns().unwrap_or_default();
     let stamp_ns = |t: f64| Some(start_ns + (t * 1e9).round() as i64);
     let watched = tally.detector == watch::NAME;

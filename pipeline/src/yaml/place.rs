@@ -1,15 +1,15 @@
-//! Places in a file: by the keys and indices that lead there, and by bytes.
+//! Places in a file, as paths of keys and indices, and their byte ranges.
 
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::ops::Range;
 
-/// The way from the top of a file to a value, as a JSON pointer.
+/// Path from the root of a file to a value, as a JSON pointer.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 pub struct Place(String);
 
 impl Place {
-    /// The top of the file.
+    /// The root of the file.
     pub fn root() -> Self {
         Self::default()
     }
@@ -30,12 +30,12 @@ impl Place {
         Self(format!("{}/{index}", self.0))
     }
 
-    /// From a JSON pointer.
+    /// Creates a place from a JSON pointer.
     pub(super) fn from_pointer(pointer: &str) -> Self {
         Self(pointer.to_owned())
     }
 
-    /// From where deserialising stopped.
+    /// Creates a place from the path of a deserialisation error.
     pub(super) fn from_serde(path: &serde_path_to_error::Path) -> Self {
         use serde_path_to_error::Segment;
         path.iter()
@@ -46,7 +46,7 @@ impl Place {
             })
     }
 
-    /// The entry of the file's top that this place is in: `/stages/2`, `/cells/demo`.
+    /// The top-level entry that contains this place: `/stages/2`, `/cells/demo`.
     pub(super) fn entry(&self) -> Self {
         let ends = self.0.match_indices('/').map(|(at, _)| at);
         let end = ends.skip(1).nth(1).unwrap_or(self.0.len());
@@ -57,7 +57,7 @@ impl Place {
         self.0.rfind('/').map(|at| Self(self.0[..at].to_owned()))
     }
 
-    /// For people: `stages[2].input`; empty at the top.
+    /// Readable form: `stages[2].input`; empty for the root.
     pub fn describe(&self) -> String {
         let mut text = String::new();
         for segment in self.0.split('/').skip(1) {
@@ -82,7 +82,7 @@ struct Entry {
     value: Range<usize>,
 }
 
-/// Where in a text each place stands \[bytes\].
+/// Ranges of all places in a text \[bytes\].
 #[derive(Debug, Default)]
 pub struct Spans {
     entries: HashMap<Place, Entry>,
@@ -93,13 +93,13 @@ impl Spans {
         self.entries.insert(place, Entry { key, value });
     }
 
-    /// The value at `place`, or else at the nearest place around it.
+    /// Range of the value at `place`, or at the nearest enclosing place.
     pub fn value(&self, place: &Place) -> Range<usize> {
         self.nearest(place)
             .map_or(0..0, |entry| entry.value.clone())
     }
 
-    /// The key at `place`; the value where it has none.
+    /// Range of the key at `place`; of the value if it has no key.
     pub fn key(&self, place: &Place) -> Range<usize> {
         self.nearest(place).map_or(0..0, |entry| {
             entry.key.clone().unwrap_or_else(|| entry.value.clone())

@@ -1,4 +1,4 @@
-//! The shape of a file against the schema of its type, in words.
+//! Check of a file's shape against the schema of its type, with readable messages.
 
 use std::sync::Arc;
 
@@ -11,8 +11,8 @@ use super::place::{Place, Spans};
 use crate::report::{Problem, Report, Source};
 use crate::suggest;
 
-/// Mismatches after which no more are looked for.
-/// Resolution: bounds time; more than anybody reads.
+/// Largest number of mismatches that are reported.
+/// Resolution: bounds time; more than a user reads.
 const MOST_MISMATCHES: usize = 200;
 
 /// Compares `value` with the schema of `T`.
@@ -40,9 +40,8 @@ pub fn check<T: JsonSchema>(source: &Arc<Source>, value: &Value, spans: &Spans) 
     report
 }
 
-/// Takes out of `value` every key whose value has the wrong shape, so that the rest can be looked at;
-/// the places of what was taken out. `None` if that cannot be had: something is missing, or the whole
-/// is of the wrong kind.
+/// Removes every key with a mismatch from `value`, so that the rest can be checked, and returns the removed places.
+/// `None` if the rest is still invalid: a key is missing, or the whole has the wrong type.
 pub fn prune<T: JsonSchema>(value: &mut Value) -> Option<Vec<Place>> {
     let schema = schemars::schema_for!(T).to_value();
     let validator = jsonschema::validator_for(&schema).ok()?;
@@ -63,7 +62,7 @@ pub fn prune<T: JsonSchema>(value: &mut Value) -> Option<Vec<Place>> {
     }
     let mut places = Vec::new();
     for (parent, key) in wrong {
-        // An item of a list stays: without it the others would change their places.
+        // Items of lists are kept, because removing one would shift the indices of the others.
         if let Some(Value::Object(map)) = value.pointer_mut(&parent) {
             map.remove(&key);
         }
@@ -72,7 +71,7 @@ pub fn prune<T: JsonSchema>(value: &mut Value) -> Option<Vec<Place>> {
     validator.is_valid(value).then_some(places)
 }
 
-/// Names of JSON Schema's types as people say them.
+/// Readable names of JSON Schema types.
 fn type_words(kind: &TypeKind) -> String {
     let names: Vec<&str> = match kind {
         TypeKind::Single(one) => vec![type_word(one.as_str())],
@@ -216,8 +215,8 @@ impl Words<'_> {
         Problem::at(self.source, self.spans.value(place), title).maybe_help(nearest)
     }
 
-    /// A value that may be one of several shapes: the shape that was meant is the one it resembles,
-    /// and its mismatches are said; where it resembles none, what it may be is listed.
+    /// Reports a value that matches none of several alternatives. If it resembles one, the mismatches with that one
+    /// are reported; otherwise the alternatives are listed.
     fn alternatives(
         &self,
         error: &ValidationError<'_>,
@@ -262,7 +261,7 @@ impl Words<'_> {
         }
         let place = Place::from_pointer(here);
         types.retain(|name| !name.is_empty() && name != "nothing");
-        // Where the allowed texts are known, that a text is expected says nothing new.
+        // If the allowed texts are listed, "a text" is redundant.
         if !words.is_empty() {
             types.retain(|name| name != "a text");
         }
@@ -278,7 +277,7 @@ impl Words<'_> {
         report.push(Problem::at(self.source, self.spans.value(&place), title));
     }
 
-    /// The keys that the schema knows where `error` was found.
+    /// Keys that the schema allows at the place of `error`.
     fn keys_at(&self, error: &ValidationError<'_>) -> Vec<String> {
         self.schema_around(error)
             .and_then(|schema| schema.get("properties")?.as_object())
@@ -286,7 +285,7 @@ impl Words<'_> {
             .unwrap_or_default()
     }
 
-    /// The part of the schema that holds the keyword that `error` is about.
+    /// The part of the schema that contains the keyword of `error`.
     fn schema_around(&self, error: &ValidationError<'_>) -> Option<&Value> {
         let path = error.schema_path().as_str();
         let parent = &path[..path.rfind('/')?];
@@ -314,7 +313,7 @@ fn strings(options: &Value) -> Vec<String> {
         .collect()
 }
 
-/// Of a description, what fits on a line.
+/// The first sentence of a description, on one line.
 fn first_sentence(text: &str) -> String {
     let text = text.replace('\n', " ").replace(['\\'], "");
     match text.find(". ") {

@@ -9,7 +9,7 @@ use super::*;
 #[derive(Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Part {
-    /// How much there is of it. More text.
+    /// Mass of the part. More text.
     mass_kg: f64,
     #[serde(default)]
     #[schemars(range(min = 1, max = 3))]
@@ -78,7 +78,7 @@ error: the key `mass_kg` is missing in `parts[0]`
 2 |   - mas_kg: 2
   |     ^^^^^^^^^
   |
-  = help: `mass_kg`: How much there is of it.
+  = help: `mass_kg`: Mass of the part.
 
 error: expected a number, found the text `heavy`
  --> whole.yaml:3:14

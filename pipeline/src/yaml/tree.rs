@@ -1,7 +1,7 @@
-//! YAML text to a value and the places of its parts.
+//! Parser from YAML text to a value and the places of its parts.
 //!
-//! Built from the parser's events rather than its tree, so that all duplicate keys are found with both
-//! their places, and depth and aliases are bounded: a hostile file is an error, not a hang.
+//! It is built on the events of the YAML parser instead of its tree: duplicate keys are found with both places, and
+//! depth and aliases are bounded, so that a malicious file is an error and not a hang.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -15,20 +15,20 @@ use serde_json::{Map, Number, Value};
 use super::place::{Place, Spans};
 use crate::report::{Problem, Report, Source};
 
-/// Deeper than any file of ours.
+/// Largest nesting depth, above that of any valid file.
 /// Resolution: bounds the stack.
 const DEEPEST: usize = 64;
-/// Most mappings: those of a pipeline for a thousand cells.
+/// Largest number of mappings, that of a pipeline for a thousand cells.
 /// Resolution: bounds time.
 const MOST_MAPPINGS: usize = 20_000;
-/// Nodes that aliases may add.
+/// Largest number of nodes that aliases may add.
 /// Resolution: bounds memory and time.
 const MOST_ALIASED_NODES: usize = 10_000;
 
 /// Parses the one document in `source`.
 ///
 /// # Errors
-/// What is not YAML, or not a file of ours whatever its schema.
+/// Invalid YAML, or content that no schema allows.
 pub fn parse(source: &Arc<Source>) -> Result<(Value, Spans), Report> {
     let mut builder = Builder::new(source);
     for event in Parser::new_from_str(&source.text) {
@@ -58,7 +58,7 @@ pub fn parse(source: &Arc<Source>) -> Result<(Value, Spans), Report> {
 #[derive(Clone)]
 struct Node {
     span: Range<usize>,
-    /// Nodes in it, itself included.
+    /// Number of nodes in it, including itself.
     size: usize,
     kind: Kind,
 }
@@ -76,7 +76,7 @@ struct Key {
     span: Range<usize>,
 }
 
-/// A collection whose end has not come yet.
+/// A collection that is not yet complete.
 struct Open {
     start: usize,
     anchor: usize,
@@ -284,7 +284,7 @@ impl<'a> Builder<'a> {
         *key = Some(new);
     }
 
-    /// Hands a finished node to what contains it.
+    /// Adds a finished node to its enclosing collection.
     fn add(&mut self, node: Node, anchor: usize) {
         if anchor > 0 {
             self.anchors.insert(anchor, node.clone());
@@ -304,7 +304,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// A collection is pointed at by its first line: underlining all of it hides what is meant.
+    /// First line of a collection, which marks it in a report more clearly than its full text.
     fn first_line(&self, start: usize, end: usize) -> Range<usize> {
         let text = &self.source.text[start..end.max(start)];
         let line = text.lines().next().unwrap_or("");
@@ -330,7 +330,7 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Writes down where each node stands and gives its value. Bounded in depth by [`DEEPEST`].
+/// Converts a node to a value and records the places of its parts. Its depth is bounded by [`DEEPEST`].
 fn convert(node: Node, place: &Place, key: Option<Range<usize>>, spans: &mut Spans) -> Value {
     spans.insert(place.clone(), key, node.span);
     match node.kind {
@@ -352,9 +352,9 @@ fn convert(node: Node, place: &Place, key: Option<Range<usize>>, spans: &mut Spa
     }
 }
 
-/// The parser counts characters; texts are cut by bytes.
+/// Conversion from the parser's character offsets to byte offsets.
 struct Offsets {
-    /// Byte offset of every character, and of the end; empty for a text of ASCII alone.
+    /// Byte offset of every character, and of the end; empty for an ASCII text.
     bytes: Vec<usize>,
     length: usize,
 }

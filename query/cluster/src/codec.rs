@@ -1,4 +1,4 @@
-//! How plans travel: what reads recordings as JSON, all else as Ballista has it.
+//! Codecs of plans: nodes that read recordings as JSON, all others by Ballista's codec.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use datafusion_proto::logical_plan::LogicalExtensionCodec;
 use datafusion_proto::physical_plan::PhysicalExtensionCodec;
 use tauscope_query::{ArchiveExec, ArchiveTable, Scan};
 
-/// What our own nodes begin with. No message of protobuf does: its first byte would be field 0.
+/// Prefix of our own nodes. No protobuf message begins with it: its first byte would be field 0.
 const OURS: &[u8] = b"\0tauscope";
 
 fn failed(error: serde_json::Error) -> DataFusionError {

@@ -26,15 +26,15 @@ pub struct Args {
     /// Tasks at once; 0 for one on each core.
     #[arg(long, default_value_t = 0)]
     tasks: usize,
-    /// Folder for what tasks hand on to each other; a temporary one without it.
+    /// Folder for results passed between tasks; a temporary one by default.
     #[arg(long)]
     work_dir: Option<PathBuf>,
 }
 
-/// Runs until it is ended.
+/// Runs until it is terminated.
 ///
 /// # Errors
-/// If the scheduler is not there, or is another build.
+/// If the scheduler does not answer, or is another build.
 pub async fn run(args: &Args) -> anyhow::Result<()> {
     handshake::check(&args.scheduler).await?;
     let (host, port) = args

@@ -1,5 +1,5 @@
-//! Whether two programs are the same build. Plans of another build cannot be read, and Ballista 54 takes an executor that
-//! cannot read a plan for broken. So nothing is sent before both have said what they are.
+//! Check that two programs are the same build. Plans of another build cannot be decoded, and Ballista 54 treats an
+//! executor that cannot decode a plan as broken. So the builds are compared before any plan is sent.
 
 use std::time::Duration;
 
@@ -8,18 +8,18 @@ use sha2::{Digest as _, Sha256};
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
-/// Where the scheduler says what it is, on its own port.
+/// HTTP path of the scheduler's build, on its own port.
 pub const PATH: &str = "/tauscope/build";
 
-/// How long an answer may take.
+/// Timeout of the answer.
 /// Resolution: a scheduler answers in milliseconds.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Longest answer that is read \[bytes\].
+/// Longest accepted answer \[bytes\].
 /// Resolution: bounds memory; an answer has some 200.
 const MAX_BYTES: u64 = 4096;
 
-/// This build: its versions, and the hash of the program itself.
+/// Identifier of this build: its versions, and the hash of the program itself.
 ///
 /// # Errors
 /// If the program cannot be read.
@@ -39,7 +39,7 @@ pub fn build() -> anyhow::Result<String> {
 /// Checks that the scheduler at `address` (`host:port`) is this build.
 ///
 /// # Errors
-/// If it is not there, says nothing, or is another.
+/// If it does not answer, sends no build, or is another build.
 pub async fn check(address: &str) -> anyhow::Result<()> {
     let told = tokio::time::timeout(PATIENCE, ask(address)).await;
     let told = told.with_context(|| {

@@ -11,8 +11,8 @@ use std::process::ExitCode;
 use clap::Parser;
 use tauscope_pipeline::report::Report;
 
-/// Time between two signs of life of an executor \[s\].
-/// Resolution: how soon a dead one is noticed, against messages of a hundred executors.
+/// Time between two heartbeats of an executor \[s\].
+/// Resolution: how soon a lost one is detected, against messages of a hundred executors.
 const HEARTBEAT_S: u64 = 2;
 
 /// Longest message \[bytes\]. A plan names each recording; a hundred thousand names take some 10 MB.

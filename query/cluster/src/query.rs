@@ -13,7 +13,7 @@ use tauscope_query::output::Answer;
 use crate::codec::{LogicalCodec, PhysicalCodec};
 use crate::{MAX_MESSAGE_BYTES, Rejected, handshake};
 
-/// Ask in SQL, answered by the executors. The recordings have the same paths on all machines.
+/// Run an SQL query on the executors. The recordings have the same paths on all machines.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The query.
@@ -23,20 +23,20 @@ pub struct Args {
     /// The scheduler, host and port.
     #[arg(long, default_value = "127.0.0.1:50050")]
     scheduler: String,
-    /// Parts that the recordings are split into; each has its own, and is done again if its executor dies.
+    /// Partitions of the recordings. A partition is executed again if its executor dies.
     #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..))]
     partitions: u16,
-    /// Time after which the query is given up [s].
+    /// Time after which the query is aborted [s].
     #[arg(long, default_value_t = 3600, value_name = "S")]
     deadline_s: u64,
     #[command(flatten)]
     answer: Answer,
 }
 
-/// Asks, and writes the answer.
+/// Runs the query and writes the answer.
 ///
 /// # Errors
-/// If the query is wrong, the scheduler is another build, or there is no answer in time.
+/// If the query is invalid, the scheduler is another build, or there is no answer in time.
 pub async fn run(args: &Args) -> anyhow::Result<()> {
     args.answer.check().map_err(Rejected)?;
     handshake::check(&args.scheduler).await?;

@@ -15,11 +15,11 @@ use tonic::service::RoutesBuilder;
 use crate::codec::{LogicalCodec, PhysicalCodec};
 use crate::{HEARTBEAT_S, MAX_MESSAGE_BYTES, handshake};
 
-/// Silence after which an executor is taken for dead \[s\]: its work is given to others.
+/// Silence after which an executor is treated as lost and its work reassigned \[s\].
 /// Resolution: several heartbeats, against how long a query waits.
 const DEAD_AFTER_S: u64 = 5 * HEARTBEAT_S;
 
-/// Plan queries and hand them out to executors.
+/// Plan queries and distribute them to executors.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Address and port to listen on. There is neither encryption nor a password: keep it inside a private network.
@@ -27,7 +27,7 @@ pub struct Args {
     listen: SocketAddr,
 }
 
-/// Runs until it is ended.
+/// Runs until it is terminated.
 ///
 /// # Errors
 /// If the address is taken.

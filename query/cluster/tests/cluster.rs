@@ -1,6 +1,6 @@
-//! A scheduler and executors as programs of their own, and what they answer.
+//! Tests of a scheduler and executors as separate programs.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -22,7 +22,7 @@ fn root() -> PathBuf {
         .to_owned()
 }
 
-/// So many free ports one after the other.
+/// First of `count` consecutive free ports.
 fn ports(count: u16) -> u16 {
     loop {
         let first = TcpListener::bind("127.0.0.1:0")
@@ -120,7 +120,7 @@ fn ask(port: u16, arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// The answer of one process.
+/// Answer of a single process.
 fn alone(sql: &str, paths: &[PathBuf]) -> String {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
@@ -136,7 +136,7 @@ fn alone(sql: &str, paths: &[PathBuf]) -> String {
     })
 }
 
-/// An archive of copies under names of their own, and a pipeline that is found from any folder.
+/// An archive of copies with distinct names, and a pipeline with absolute paths.
 fn archive() -> (tempfile::TempDir, String, String) {
     let folder = tempfile::tempdir().unwrap();
     let data = root().join("tests/data");

@@ -6,24 +6,24 @@ use tauscope_dynamics::terms::{Quantity, TermSpec};
 use tauscope_dynamics::{Drive, Inertia, Model};
 use tauscope_explain::report::Finding;
 
-/// Smallest change of a direction of gravity that counts \[m/s²\]. Resolution: of a file with seven digits.
+/// Smallest change of gravity that is written \[m/s²\]. Resolution: of a file with seven digits.
 const LEAST_GRAVITY_M_S2: f64 = 1e-6;
 
-/// Numbers that differ by less, as a share, are the same. Resolution: of nine digits.
+/// Relative difference below which two numbers are equal. Resolution: of nine digits.
 const SAME: f64 = 1e-9;
 
-/// New values of a joint's quantities; `None` where the old one stays.
+/// New values of a joint's quantities; `None` if the old value stays.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct JointCorrections {
     /// Viscous friction \[N m s/rad or N s/m\].
     pub damping: Option<f64>,
     /// Dry friction \[N m or N\].
     pub friction: Option<f64>,
-    /// Dry friction at rest, where that is larger \[N m or N\].
+    /// Dry friction at rest, if it is larger \[N m or N\].
     pub static_friction: Option<f64>,
     /// Inertia of the rotor \[kg m² or kg\].
     pub armature: Option<f64>,
-    /// Stiffness of a spring and where it is at rest \[N m/rad, rad; or N/m, m\].
+    /// Stiffness and rest position of a spring \[N m/rad, rad; or N/m, m\].
     pub spring: Option<[f64; 2]>,
     /// Error of the zero \[rad or m\].
     pub zero: Option<f64>,
@@ -45,8 +45,8 @@ pub struct Corrections {
 }
 
 impl Corrections {
-    /// The changes that these terms make in the model of a robot. Terms of the same kind add up. Of bodies, those that `findings` name
-    /// count, as the twin has them: a twin also has the usual errors of all others, which are no correction.
+    /// Collects the changes that these terms make in the model of a robot. Terms of the same kind add up. Bodies are
+    /// taken from the twin if `findings` name them; the twin's small changes of the other bodies are not corrections.
     pub fn of(model: &Model, terms: &[TermSpec], findings: &[Finding]) -> Self {
         let mut all = Self::default();
         let mut turned = model.clone();
@@ -105,7 +105,7 @@ impl Corrections {
         all
     }
 
-    /// Whether they are bodies and nothing else, so that a corrected URDF is the whole corrected twin.
+    /// Whether all corrections are bodies, so that a corrected URDF replaces the corrected twin.
     pub fn is_only_bodies(&self) -> bool {
         let is_else = !self.joints.is_empty() || self.gravity.is_some() || !self.lost.is_empty();
         !self.bodies.is_empty() && !is_else
@@ -116,7 +116,7 @@ impl Corrections {
         self.joints.is_empty() && self.bodies.is_empty() && self.gravity.is_none()
     }
 
-    /// Adds what a term adds to its link, if the link is one of `named`.
+    /// Adds a term's inertia to its link, if the link is one of `named`.
     fn add_body(&mut self, model: &Model, spec: &TermSpec, named: &BTreeSet<usize>) {
         let body = body_of(model, spec).filter(|(link, _)| named.contains(link));
         let Some((link, change)) = body else { return };
@@ -137,7 +137,7 @@ fn names_link(findings: &[Finding], spec: &TermSpec) -> bool {
     spec.link.is_some() && findings.iter().any(|finding| finding.link == spec.link)
 }
 
-/// Links whose mass or inertia a finding corrects: it names the link, or the link's joint and the parameters of a term.
+/// Links whose mass or inertia a finding corrects: it names the link, or the link's joint and a term's parameters.
 fn named_links(model: &Model, terms: &[TermSpec], findings: &[Finding]) -> BTreeSet<usize> {
     let is_named = |spec: &TermSpec, link: usize| {
         let link = &model.links()[link];
@@ -157,7 +157,7 @@ fn named_links(model: &Model, terms: &[TermSpec], findings: &[Finding]) -> BTree
 }
 
 impl JointCorrections {
-    /// Drops what the robot's file states already.
+    /// Removes values that the robot's file already states.
     fn drop_stated(&mut self, drive: Drive) {
         let is_new = |x: &f64, stated: f64| (x - stated).abs() > SAME * stated.abs();
         self.damping = self.damping.filter(|x| is_new(x, drive.damping));

@@ -1,4 +1,4 @@
-//! Changes at places of a text that stays as it is elsewhere.
+//! Edits of single places in a text, which is otherwise preserved.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use roxmltree::{Document, Node};
 pub struct Edits<'a> {
     text: &'a str,
     all: Vec<(Range<usize>, String)>,
-    /// Attributes to be added to a start tag, by the place behind the tag's name.
+    /// Attributes to add to a start tag, by the offset behind the tag's name.
     added: Vec<(usize, String)>,
 }
 
@@ -21,7 +21,7 @@ impl<'a> Edits<'a> {
         }
     }
 
-    /// Gives an attribute this value, whether it is there or not.
+    /// Sets an attribute, which may be absent.
     pub fn set(&mut self, node: Node<'_, '_>, name: &str, value: &str) {
         match node.attribute_node(name) {
             Some(old) => self.all.push((old.range_value(), value.to_owned())),
@@ -31,7 +31,7 @@ impl<'a> Edits<'a> {
         }
     }
 
-    /// Takes an attribute away.
+    /// Removes an attribute.
     pub fn remove(&mut self, node: Node<'_, '_>, name: &str) {
         if let Some(old) = node.attribute_node(name) {
             let range = old.range();
@@ -46,7 +46,7 @@ impl<'a> Edits<'a> {
         self.all.push((range, new));
     }
 
-    /// Puts an element into another as its first.
+    /// Inserts an element as the first child of another.
     pub fn insert(&mut self, node: Node<'_, '_>, element: &str) {
         let outer = indent_of(self.text, node.range().start);
         if let Some(first) = node.first_child() {
@@ -71,7 +71,7 @@ impl<'a> Edits<'a> {
         let mut text = self.text.to_owned();
         let mut all = self.all;
         all.extend(self.added.into_iter().map(|(at, new)| (at..at, new)));
-        // Stable: what is added at one place stays in its order, and before what is replaced there.
+        // A stable sort keeps the order of additions at one place, and puts them before replacements there.
         all.sort_by_key(|(range, _)| (range.start, range.end));
         for (range, new) in all.into_iter().rev() {
             text.replace_range(range, &new);
@@ -80,7 +80,7 @@ impl<'a> Edits<'a> {
     }
 }
 
-/// The name of an element as it is written, with its prefix.
+/// The name of an element as written, with its prefix.
 fn tag_name<'a>(text: &'a str, node: Node<'_, '_>) -> &'a str {
     let from = node.range().start + 1;
     let rest = &text[from..];
@@ -92,7 +92,7 @@ fn behind_name(text: &str, node: Node<'_, '_>) -> usize {
     node.range().start + 1 + tag_name(text, node).len()
 }
 
-/// The blanks between the start of a line and what stands in it.
+/// The indentation of the line of an element.
 pub fn indent_of(text: &str, at: usize) -> String {
     let line = text[..at].rfind('\n').map_or(0, |end| end + 1);
     let before = &text[line..at];
@@ -111,7 +111,7 @@ pub fn child<'a, 'i>(node: Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
     node.children().find(|child| child.has_tag_name(tag))
 }
 
-/// A number with as many digits as it needs and no more than twelve.
+/// A number with as many digits as necessary, at most twelve.
 pub fn digits(x: f64) -> String {
     let text = format!("{x:.11e}");
     text.parse::<f64>().map_or(text, |x| x.to_string())

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::corrections::Corrections;
 use super::edits::digits;
 
-/// An `actuators` dictionary with one group a joint, for the `ArticulationCfg` of the robot.
+/// An `actuators` dictionary with one group for each joint, for the `ArticulationCfg` of the robot.
 pub fn configuration(corrections: &Corrections) -> String {
     let mut text = String::from(
         "from isaaclab.actuators import ImplicitActuatorCfg\n\n\
@@ -14,7 +14,7 @@ pub fn configuration(corrections: &Corrections) -> String {
     );
     for (joint, own) in &corrections.joints {
         let at_rest = own.static_friction.or(own.friction);
-        // At rest friction is at least that in motion.
+        // Friction at rest is at least the friction in motion.
         let at_rest = at_rest.map(|x| x.max(own.friction.unwrap_or(0.0)));
         let values = [
             ("armature=", own.armature),

@@ -22,10 +22,11 @@ const OF_INERTIA: [&str; 7] = [
     "euler",
 ];
 
-/// The MJCF with corrections. `urdf` is the robot as the twin reads it: where the bodies' frames are in the links' stands there.
+/// Writes corrections into an MJCF. `urdf` is the robot as the twin reads it, with the poses of the body frames in
+/// the link frames.
 ///
 /// # Errors
-/// If it is no MJCF, lacks a joint or a body, or a body would not be a rigid one.
+/// If the file is not an MJCF, lacks a joint or a body, or a body would not be rigid.
 pub fn corrected(mjcf: &str, urdf: &str, corrections: &Corrections) -> Result<String, ModelError> {
     let document = parse(mjcf, Target::Mjcf)?;
     let robot = Document::parse(urdf)?;
@@ -67,7 +68,7 @@ pub fn corrected(mjcf: &str, urdf: &str, corrections: &Corrections) -> Result<St
     Ok(edits.done())
 }
 
-/// Bodies and joints by name; those without one are called as the reader of models calls them: by their numbers.
+/// Bodies and joints by name; unnamed ones have the numbered names that the model reader gives them.
 fn named_parts<'a, 'i>(
     document: &'a Document<'i>,
 ) -> (
@@ -109,7 +110,7 @@ fn angles_in_degrees(document: &Document<'_>) -> bool {
     angle != Some("radian")
 }
 
-/// The frame of a body in its link.
+/// Pose of a body's frame in its link.
 fn frame(robot: &Document<'_>, link: &str) -> Isometry3<f64> {
     let node = super::edits::named(robot, "link", link);
     let own = node.and_then(|node| {
@@ -146,7 +147,7 @@ fn of_body(node: Node<'_, '_>, body: &Inertia, frame: &Isometry3<f64>, edits: &m
     edits.set(inertial, "fullinertia", &full);
 }
 
-/// `unit` are the file's angles per radian.
+/// `unit` is the file's angle unit per radian.
 fn of_joint(node: Node<'_, '_>, own: &JointCorrections, unit: f64, edits: &mut Edits<'_>) {
     let values = [
         ("damping", own.damping),
@@ -164,7 +165,7 @@ fn of_joint(node: Node<'_, '_>, own: &JointCorrections, unit: f64, edits: &mut E
         let reference = node
             .attribute("ref")
             .and_then(|text| text.trim().parse::<f64>().ok());
-        // The joint turns by its position less the reference.
+        // The joint turns by its position minus the reference.
         let value = reference.unwrap_or(0.0) - unit * zero;
         edits.set(node, "ref", &digits(value));
     }

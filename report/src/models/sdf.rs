@@ -7,10 +7,10 @@ use super::edits::{Edits, child, digits, indent_of};
 use super::urdf::{parse, refuse_no_body};
 use super::{ModelError, Target};
 
-/// The SDF with corrections. Its links and joints have the names and frames of the URDF.
+/// Writes corrections into an SDF, whose links and joints have the names and frames of the URDF.
 ///
 /// # Errors
-/// If it is no SDF, lacks a joint or a link, or a link would not be a rigid body.
+/// If the file is not an SDF, lacks a joint or a link, or a link would not be a rigid body.
 pub fn corrected(sdf: &str, corrections: &Corrections) -> Result<String, ModelError> {
     let document = parse(sdf, Target::Sdf)?;
     let mut edits = Edits::of(sdf);
@@ -43,7 +43,7 @@ pub fn corrected(sdf: &str, corrections: &Corrections) -> Result<String, ModelEr
     Ok(edits.done())
 }
 
-/// The link or joint of that name, in whatever model it is.
+/// The link or joint of that name, in any model of the file.
 fn part<'a, 'i>(
     document: &'a Document<'i>,
     kind: &'static str,

@@ -30,18 +30,18 @@ pub const TARGETS: [Target; 5] = [
     Target::Drake,
 ];
 
-/// A place of a quantity in a simulator's file: the element with its unit, or why there is none.
+/// Element of a quantity in a simulator's file with its unit, or the reason why there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// The element.
     At(&'static str),
-    /// The simulator has none, and what comes nearest.
+    /// No such element; the nearest alternative or the reason.
     None(&'static str),
 }
 
 use Place::{At, None as Lacks};
 
-/// Names of quantities, as the table has them.
+/// Names of quantities, as in the table.
 const QUANTITIES: [&str; 8] = [
     "viscous friction",
     "dry friction",
@@ -70,7 +70,7 @@ impl Target {
         TARGETS.into_iter().find(|target| target.name() == name)
     }
 
-    /// The outermost element of its file; nothing for one that is made anew.
+    /// The outermost element of its file; `None` for a file that is created.
     pub fn root(self) -> Option<&'static str> {
         match self {
             Self::Urdf | Self::Drake => Some("robot"),
@@ -145,7 +145,7 @@ impl Target {
         std::array::from_fn(|k| (QUANTITIES[k], places[k]))
     }
 
-    /// The corrections that it writes, and those that it has no element for, a line each.
+    /// One line for each written correction, and one for each that has no element.
     pub fn said(self, corrections: &Corrections) -> (Vec<String>, Vec<String>) {
         let (mut written, mut lost) = (Vec::new(), Vec::new());
         let places = self.places();
@@ -190,7 +190,7 @@ impl Target {
         (written, lost)
     }
 
-    /// A text with a comment before its first element that lists what is in it and what is not.
+    /// Adds a comment before the first element that lists the written and the missing corrections.
     pub(super) fn with_comment(self, text: &str, written: &[String], lost: &[String]) -> String {
         let mut comment = String::from("Corrected by tauscope.\n");
         for (title, lines) in [("Written", written), ("Not written, or only nearly", lost)] {

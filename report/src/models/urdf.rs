@@ -8,15 +8,15 @@ use super::corrections::{Corrections, JointCorrections};
 use super::edits::{Edits, child, digits, indent_of, named};
 use super::{ModelError, Target};
 
-/// A triangle inequality may be missed by this share: a thin rod stands on its edge, and numbers are rounded.
+/// Relative tolerance of the triangle inequality: a thin rod attains it with equality, and numbers are rounded.
 const TOLERANCE: f64 = 1e-6;
 /// Namespace of Drake's elements.
 const DRAKE: &str = "http://drake.mit.edu";
 
-/// The URDF with corrections.
+/// Writes corrections into a URDF.
 ///
 /// # Errors
-/// If it is no URDF, lacks a joint or a link, or a link would not be a rigid body.
+/// If the file is not a URDF, lacks a joint or a link, or a link would not be a rigid body.
 pub fn corrected(
     target: Target,
     urdf: &str,
@@ -51,10 +51,10 @@ pub fn corrected(
     Ok(edits.done())
 }
 
-/// The document, if it is one of the target's.
+/// Parses the file.
 ///
 /// # Errors
-/// If it is not.
+/// If it is not XML or of another kind than the target.
 pub fn parse(text: &str, target: Target) -> Result<Document<'_>, ModelError> {
     let document = Document::parse(text)?;
     let found = document.root_element().tag_name().name();
@@ -90,7 +90,7 @@ fn of_joint(target: Target, node: Node<'_, '_>, own: &JointCorrections, edits: &
     }
 }
 
-/// Moves the zero of a joint: its origin, then the motion by `zero` along or about its axis.
+/// Moves the zero of a joint: its origin, followed by the motion by `zero` along or about its axis.
 fn turn_zero(node: Node<'_, '_>, zero: f64, edits: &mut Edits<'_>) {
     let three = |element: Option<Node<'_, '_>>, name: &str, default: [f64; 3]| {
         let text = element.and_then(|element| element.attribute(name));
@@ -127,7 +127,7 @@ fn turn_zero(node: Node<'_, '_>, zero: f64, edits: &mut Edits<'_>) {
     }
 }
 
-/// Rotors as Drake reads them: in the actuator of the joint's transmission.
+/// Writes rotor inertias where Drake reads them: in the actuator of the joint's transmission.
 fn drives(document: &Document<'_>, corrections: &Corrections, edits: &mut Edits<'_>) {
     let root = document.root_element();
     let has_prefix = root.namespaces().any(|own| own.uri() == DRAKE);
@@ -179,7 +179,7 @@ fn drives(document: &Document<'_>, corrections: &Corrections, edits: &mut Edits<
     }
 }
 
-/// Refuses ten parameters that no rigid body has.
+/// Rejects inertial parameters that no rigid body has.
 ///
 /// # Errors
 /// If the mass is not positive, or a second moment is negative.

@@ -1,4 +1,4 @@
-//! Puts together the state of all joints, which one message may bring or several.
+//! Assembly of the state of all joints from one message or several.
 
 use tauscope_archive::{FIELDS, FieldTally, NotFinite, ros};
 use tauscope_bus::{JointArray, MAX_JOINTS};
@@ -6,8 +6,8 @@ use tauscope_bus::{JointArray, MAX_JOINTS};
 use super::layout::Layout;
 use crate::clock::Clock;
 
-/// Parts of a state that come apart by more than this are of publishers of which one has ceased \[ns\].
-/// Resolution: longer than two rates of one robot differ by, short against what a person misses.
+/// Time between parts of a state above which one of the publishers has stopped \[ns\].
+/// Resolution: longer than the difference between two rates of one robot, short compared with what a person notices.
 const APART_NS: i64 = 500_000_000;
 
 /// A state of all joints, in the robot's order.
@@ -44,17 +44,18 @@ pub struct Gather {
     all: u32,
     seen: u32,
     parts: Whole,
-    /// When the first and the newest of these parts were received, and how many messages a newer one has replaced.
+    /// Reception times of the first and the newest of these parts, and the number of messages replaced by a newer
+    /// one.
     since_ns: i64,
     newest_ns: i64,
     replaced: u64,
-    /// Replaced messages of states that were whole too late.
+    /// Replaced messages of states that were completed too late.
     in_vain: u64,
-    /// By joint, its position, velocity and effort: how many are not finite.
+    /// Number of non-finite values of position, velocity and effort, by joint.
     fields: Vec<[FieldTally; 3]>,
     /// Stamp of the first message \[ns\].
     first_ns: Option<i64>,
-    /// Numbers that were not finite.
+    /// Number of non-finite values.
     bad: u64,
 }
 
@@ -69,7 +70,7 @@ const NOTHING: Whole = Whole {
 };
 
 impl Gather {
-    /// Nothing gathered yet, of at most 16 joints.
+    /// Creates an empty assembly of at most 16 joints.
     pub fn new(joint_count: usize) -> Self {
         Self {
             all: u32::MAX.checked_shr(32 - joint_count as u32).unwrap_or(0),
@@ -85,9 +86,9 @@ impl Gather {
         }
     }
 
-    /// Adds a message; gives the state once each joint has been told of. Its stamp is that of its
-    /// newest part, and it has a velocity or effort if all parts have. `lacks_effort` says that the message's efforts are
-    /// no measurement.
+    /// Adds a message; returns the state once every joint has a value. Its stamp is that of its newest part. It has a
+    /// velocity or effort if all parts have one. `lacks_effort` states that the message's efforts are not
+    /// measurements.
     pub fn add(
         &mut self,
         layout: &Layout,
@@ -128,7 +129,7 @@ impl Gather {
         }
         self.in_vain = self.in_vain();
         self.seen = 0;
-        // What only some parts brought is void.
+        // A field that only some parts have is discarded.
         if !self.parts.has_velocity {
             self.parts.velocity = [0.0; MAX_JOINTS];
         }
@@ -138,13 +139,13 @@ impl Gather {
         Some(self.parts)
     }
 
-    /// Messages that made no state because a joint was missing for long.
+    /// Returns the number of messages that completed no state because a joint was missing for a long time.
     pub fn in_vain(&self) -> u64 {
         let waits = self.seen != 0 && self.newest_ns - self.since_ns > APART_NS;
         self.in_vain + if waits { self.replaced } else { 0 }
     }
 
-    /// The first joint and field that came and was never finite.
+    /// Returns the first joint and field that was present and never finite.
     pub fn never_finite(&self) -> Option<(usize, &'static str)> {
         (0..FIELDS.len()).find_map(|field| {
             let mut joints = self.fields.iter();
@@ -153,12 +154,12 @@ impl Gather {
         })
     }
 
-    /// How many numbers were not finite.
+    /// Returns the number of non-finite values.
     pub fn bad(&self) -> u64 {
         self.bad
     }
 
-    /// By joint and field, what was not finite; times count from the first message on.
+    /// Returns the non-finite values by joint and field; times are relative to the first message.
     pub fn not_finite(&self) -> impl Iterator<Item = (usize, NotFinite)> {
         let first_ns = self.first_ns.unwrap_or(0);
         let joints = self.fields.iter().enumerate();
@@ -169,7 +170,7 @@ impl Gather {
     }
 }
 
-/// The header's stamp, or the time of reception where the publisher left it at zero \[ns\].
+/// Returns the header's stamp, or the time of reception if the publisher left the stamp at zero \[ns\].
 pub fn stamp_of(header: &ros::Header, received_ns: i64) -> i64 {
     Clock::StampsOrReception.time_ns(header.stamp.ns(), received_ns)
 }

@@ -1,22 +1,22 @@
-//! Where the joints of a message stand in the cell's order.
+//! Positions of a message's joints in the cell's order.
 
-/// Layouts that are remembered; a topic with more publishers than that is searched each time.
-/// Resolution: memory against searching.
+/// Largest number of cached layouts; a topic with more publishers is searched each time.
+/// Resolution: memory against search time.
 const MAX_KNOWN: usize = 16;
 
 /// The order of one publisher's joints.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Layout {
     names: Vec<String>,
-    /// Place in the cell's order of each entry, if it is one of the cell's joints.
+    /// Index in the cell's order of each entry, if it is one of the cell's joints.
     pub places: Vec<Option<usize>>,
     /// Bit j: the message has joint j.
     pub joints: u32,
-    /// A joint of the cell that the message names more than once, and its first and second place.
+    /// A joint of the cell that the message names more than once, with its first and second index.
     pub twice: Option<(usize, [usize; 2])>,
 }
 
-/// The layouts of all publishers that were heard.
+/// The layouts of all publishers so far.
 #[derive(Debug)]
 pub struct Layouts {
     joint_names: Vec<String>,
@@ -26,7 +26,7 @@ pub struct Layouts {
 }
 
 impl Layouts {
-    /// Of a robot with these joints.
+    /// Creates the layouts of a robot with these joints.
     pub fn new(joint_names: &[String]) -> Self {
         Self {
             joint_names: joint_names.to_vec(),
@@ -36,8 +36,8 @@ impl Layouts {
         }
     }
 
-    /// The layout of a message that names these joints. Looks a layout up by comparison, without
-    /// allocating: one publisher sends the same names each time.
+    /// Returns the layout of a message that names these joints. The lookup compares names without allocation, because
+    /// one publisher sends the same names each time.
     pub fn of(&mut self, names: &[String]) -> &Layout {
         let known = if self
             .known
@@ -75,12 +75,12 @@ impl Layouts {
         self.known.len() - 1
     }
 
-    /// Name of a joint of the robot.
+    /// Returns the name of a joint of the robot.
     pub fn joint_name(&self, joint: usize) -> &str {
         &self.joint_names[joint]
     }
 
-    /// Joints of the cell that no message named.
+    /// Returns the joints of the cell that no message named.
     pub fn never_named(&self) -> Vec<String> {
         self.joint_names
             .iter()
@@ -91,7 +91,7 @@ impl Layouts {
     }
 }
 
-/// The first joint of the cell that stands at more than one place, and the first two of these.
+/// Returns the first joint of the cell that is named more than once, with its first two indices.
 fn first_twice(places: &[Option<usize>]) -> Option<(usize, [usize; 2])> {
     let mut named = places.iter().enumerate();
     named.find_map(|(second, place)| {

@@ -1,4 +1,4 @@
-//! The comparison as a page that stands alone.
+//! The comparison as a self-contained HTML page.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ table.fold,.fold tbody,.fold td{display:block}.fold tr.names{display:none}\
 .fold td{padding:0;border:0}.fold td:empty{display:none}\
 .fold td[data-label]::before{content:attr(data-label) \": \";opacity:.7}}";
 
-/// The page.
+/// Returns the page.
 pub fn page(comparison: &Comparison, a: &Path, b: &Path, note: Option<&str>) -> String {
     let markup = html! {
         (DOCTYPE)

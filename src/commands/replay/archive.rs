@@ -1,4 +1,4 @@
-//! `tauscope replay --manifest`: each recording of an archive to a result of its own.
+//! `tauscope replay --manifest`: replays each recording of an archive into a result of its own.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -25,14 +25,14 @@ use crate::output::Output;
 use crate::progress::{Progress, Show};
 use crate::terminal;
 
-/// Time between two lines that say how far it is, where no bar can be drawn.
-/// Resolution: lines in a log, against how soon one sees that it goes on.
+/// Interval of the progress lines where no bar can be drawn.
+/// Resolution: length of a log against the delay until progress shows.
 const TOLD_EVERY: Duration = Duration::from_mins(1);
 
-/// Failures that are told; all are in the list of failures.
+/// Maximum number of failures printed; the list of failures has all.
 const MAX_TOLD: usize = 10;
 
-/// A part of the work.
+/// One of several parts of a manifest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     index: usize,
@@ -59,28 +59,28 @@ impl FromStr for Shard {
     }
 }
 
-/// What is asked for.
+/// A replay of a manifest.
 #[derive(Debug)]
 pub struct Job<'a> {
     /// The manifest.
     pub manifest: &'a Path,
-    /// The part of it.
+    /// The part of the manifest to replay; all of it if `None`.
     pub shard: Option<Shard>,
     /// The folder of the results.
     pub out: &'a str,
-    /// Recordings at once.
+    /// Number of recordings replayed in parallel.
     pub jobs: u16,
-    /// What becomes of the twin's effort in an archive.
+    /// Whether a twin's effort in an archive is recomputed or kept.
     pub twin: TwinChoice,
-    /// Also a row for each judged sample.
+    /// Whether results also have a row for each judged sample.
     pub with_scores: bool,
-    /// Machine-readable.
+    /// Whether the summary is printed as JSON.
     pub json: bool,
-    /// What is shown of the progress.
+    /// Kind of progress display.
     pub show: Show,
 }
 
-/// What came of it.
+/// Numbers of recordings by outcome, and of lost samples.
 #[derive(Debug, Default, Serialize)]
 struct Summary {
     recordings: usize,
@@ -101,14 +101,14 @@ struct Failed {
     why: String,
 }
 
-/// What became of one recording. Small: there may be a hundred thousand.
+/// Outcome of one recording. Small, because there may be a hundred thousand.
 enum End {
     Done(Done),
     Failed(Box<Failed>),
     Left,
 }
 
-/// Replays what has no result yet.
+/// Replays the recordings that have no result yet.
 pub fn run(job: &Job<'_>, pipeline: &Pipeline, out: &mut Output) -> Result<Exit, Failure> {
     let manifest = Manifest::load(job.manifest)?;
     let manifest = match job.shard {
@@ -143,7 +143,7 @@ pub fn run(job: &Job<'_>, pipeline: &Pipeline, out: &mut Output) -> Result<Exit,
     if interrupted {
         let done = summary.recordings - summary.left;
         return Err(Failure::Interrupted(format!(
-            "after {done} of {} recordings; the same command goes on from there",
+            "after {done} of {} recordings; run the same command again to continue",
             summary.recordings
         )));
     }
@@ -155,7 +155,7 @@ pub fn run(job: &Job<'_>, pipeline: &Pipeline, out: &mut Output) -> Result<Exit,
     Ok(Exit::from_loss(summary.lossy > 0).and(failed))
 }
 
-/// A replay of which so many run at once.
+/// Returns a replay that is prepared to run `jobs` times in parallel.
 pub fn prepared<'a>(
     pipeline: &'a Pipeline,
     source: Option<&str>,
@@ -167,7 +167,7 @@ pub fn prepared<'a>(
     Ok(replay.reading_ahead(parallel::has_spare_core(usize::from(jobs))))
 }
 
-/// A replay for each source that the manifest names.
+/// Returns a replay for each source that the manifest names.
 fn replays<'a>(
     job: &Job<'_>,
     pipeline: &'a Pipeline,
@@ -184,7 +184,7 @@ fn replays<'a>(
     Ok(replays)
 }
 
-/// The folder that `--out` names.
+/// Returns the folder that `--out` names.
 fn folder(out: &str) -> Result<PathBuf, Report> {
     match out.split_once("://") {
         None => Ok(out.into()),
@@ -199,17 +199,17 @@ fn folder(out: &str) -> Result<PathBuf, Report> {
 
 type Work<'a> = dyn Fn(&Wanted, &mut dyn FnMut(f64) -> bool) -> Result<Done, UnitError> + Sync + 'a;
 
-/// What became of each recording.
+/// Replays all recordings of the manifest; returns their outcomes.
 fn replay_all(job: &Job<'_>, manifest: &Manifest, work: &Work<'_>) -> Vec<End> {
     let count = manifest.wanted.len();
-    // It has lines of its own.
+    // `Log` prints the progress lines of this command.
     let bar = match job.show {
         Show::BarOrLines => Show::Bar,
         other => other,
     };
     let progress = Progress::new(count, bar);
     let log = Log::new(count, job.show);
-    // Runners that meet begin at different places, so that they seldom do the same.
+    // Concurrent runners start at different recordings, so that they rarely replay the same one.
     let first = std::hash::BuildHasher::hash_one(
         &std::collections::hash_map::RandomState::new(),
         std::process::id(),
@@ -240,7 +240,7 @@ fn replay_all(job: &Job<'_>, manifest: &Manifest, work: &Work<'_>) -> Vec<End> {
     })
 }
 
-/// Lines that say how far it is, where no bar can be drawn: the log of a cluster's job.
+/// Progress lines where no bar can be drawn, such as in the log of a cluster's job.
 struct Log {
     count: usize,
     show: Show,
@@ -248,7 +248,7 @@ struct Log {
     told: Mutex<Instant>,
     ended: AtomicUsize,
     failed: AtomicUsize,
-    /// Those that took time.
+    /// Recordings that were replayed; the remaining time is estimated from these.
     replayed: AtomicUsize,
 }
 
@@ -309,7 +309,7 @@ fn sum(ends: Vec<End>) -> Summary {
     summary
 }
 
-/// Writes the list of failures, a line of JSON each; empty where there is none. Gives its name.
+/// Writes the list of failures, one line of JSON each, even if it is empty; returns its name.
 fn put_failures(job: &Job<'_>, shelf: &Folder, failed: &[Failed]) -> anyhow::Result<String> {
     let Shard { index, of } = job.shard.unwrap_or(Shard { index: 0, of: 1 });
     let manifest = job

@@ -1,4 +1,4 @@
-//! What a replay found, for people.
+//! Results of a replay, formatted for a terminal.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use tauscope_pipeline::replay::Outcome;
 use tauscope_pipeline::tally::{Event, JointRms};
 use tauscope_watch::amount;
 
-/// Per recording a line a stage, how far the twin was off, and the events.
+/// Formats, for each recording, the counts of the stages, the residuals of the twins and the events.
 pub fn table(outcomes: &[Outcome]) -> String {
     let mut text = String::new();
     for outcome in outcomes {
@@ -75,7 +75,7 @@ fn why_nothing_was_judged(outcome: &Outcome, name: &str) -> String {
     )
 }
 
-/// A row of the table: its name, and what stands in it of a joint.
+/// A row of the table: its name, and the value that it shows of a joint.
 type Row = (&'static str, fn(&JointRms) -> f64);
 
 fn rms_table(outcome: &Outcome, rms: &[JointRms]) -> Table {
@@ -90,7 +90,7 @@ fn rms_table(outcome: &Outcome, rms: &[JointRms]) -> Table {
     ];
     for (name, value) in rows {
         let values = rms.iter().map(value).map(|rms| {
-            // Not a number where there was no sample of that kind.
+            // NaN where there was no sample of that kind.
             if rms.is_finite() {
                 format!("{rms:.3}")
             } else {

@@ -1,4 +1,4 @@
-//! The case that a scenario with something concealed makes: what `tauscope explain` is given.
+//! The case file of a scenario that conceals physics, as input of `tauscope explain`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use tauscope_archive::whole_file::{self, Existing};
 use tauscope_ingest::simulated::{EffortUnit, fit_count};
 use tauscope_pipeline::scenario::ScenarioFacts;
 
-/// As [`tauscope_pipeline::files::CaseFile`] reads it.
+/// A case file as read by [`tauscope_pipeline::files::CaseFile`].
 #[expect(clippy::struct_field_names, reason = "the key is the file's")]
 #[derive(Debug, Serialize)]
 struct Case<'a> {
@@ -31,7 +31,7 @@ struct Topics {
     command: &'static str,
 }
 
-/// Writes `case.yaml` and the URDF to the folder of the recordings: all but the last two may be fitted.
+/// Writes `case.yaml` and the URDF to the folder of the recordings. All recordings but the last two are to be fitted.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -60,7 +60,7 @@ pub fn write(facts: &ScenarioFacts, out: &Path) -> anyhow::Result<PathBuf> {
     Ok(path)
 }
 
-/// Writes the URDF to the folder of the recordings, and gives its name there.
+/// Writes the URDF to the folder of the recordings, and returns its name there.
 ///
 /// # Errors
 /// If it cannot be written.
@@ -73,7 +73,7 @@ pub fn put_robot(facts: &ScenarioFacts, out: &Path) -> anyhow::Result<PathBuf> {
     Ok(robot)
 }
 
-/// The name of the URDF in the folder of the recordings.
+/// Returns the name of the URDF in the folder of the recordings.
 pub fn robot_name(facts: &ScenarioFacts) -> PathBuf {
     let robot = facts.scenario.robot.file_name();
     robot.unwrap_or("robot.urdf".as_ref()).into()

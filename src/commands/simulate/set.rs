@@ -1,4 +1,4 @@
-//! The labelled set that a scenario with test recordings makes: what `tauscope evaluate` is given.
+//! The labelled set of a scenario with test recordings, as input of `tauscope evaluate`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use tauscope_pipeline::scenario::ScenarioFacts;
 
 use super::case;
 
-/// As [`tauscope_pipeline::files::SetFile`] reads it.
+/// A set file as read by [`tauscope_pipeline::files::SetFile`].
 #[derive(Debug, Serialize)]
 struct Set<'a> {
     #[serde(rename = "set")]
@@ -34,7 +34,7 @@ struct Set<'a> {
     test: Vec<String>,
 }
 
-/// What the labels say of cycles.
+/// Cycle lengths in the file of labels.
 #[derive(Debug, Deserialize)]
 struct Cycles {
     recordings: BTreeMap<String, Cycle>,
@@ -46,7 +46,7 @@ struct Cycle {
     cycle_s: Option<f64>,
 }
 
-/// Writes `set.yaml` and the URDF to the folder of the recordings, if one of them is there to be judged on.
+/// Writes `set.yaml` and the URDF to the folder of the recordings, if the scenario has test recordings.
 ///
 /// # Errors
 /// If a file cannot be read or written.
@@ -90,7 +90,7 @@ pub fn write(facts: &ScenarioFacts, labels: &Path, out: &Path) -> anyhow::Result
     Ok(Some(path))
 }
 
-/// The length of a cycle, if all recordings hold the same one twice and more \[s\].
+/// Returns the length of a cycle \[s\], if it is equal in all recordings and each holds at least two cycles.
 fn cycle_s(labels: &Path) -> anyhow::Result<Option<f64>> {
     let text = std::fs::read_to_string(labels).with_context(|| labels.display().to_string())?;
     let cycles: Cycles = serde_json::from_str(&text).context("the labels")?;

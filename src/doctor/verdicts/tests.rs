@@ -2,7 +2,7 @@ use super::super::facts;
 use super::*;
 
 fn level(verdict: &Verdict) -> Level {
-    // Whoever is told that something is wrong is told what to do.
+    // Every verdict other than ok comes with a remedy.
     assert_eq!(
         verdict.remedy.is_none(),
         verdict.level == Level::Ok,

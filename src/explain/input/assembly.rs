@@ -1,4 +1,4 @@
-//! The parts of a request put together, and everything that is wrong with them.
+//! Assembly of a request from its parts, with all errors in them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::Metadata;
@@ -16,7 +16,7 @@ use tauscope_twin::TwinFile;
 
 use super::{Named, Request, StartFile};
 
-/// Where in the input something stands that may be wrong.
+/// Part of the input to which an error refers.
 pub enum Spot<'a> {
     /// The path of the robot.
     Robot,
@@ -30,7 +30,7 @@ pub enum Spot<'a> {
     Holdout(usize),
 }
 
-/// The parts of a request, paths resolved, nothing looked up.
+/// The parts of a request: paths are resolved, files are not opened.
 pub struct Assembly<'a> {
     /// The URDF.
     pub robot: Option<PathBuf>,
@@ -38,29 +38,29 @@ pub struct Assembly<'a> {
     pub effort_unit: EffortUnit,
     /// Torque constant by joint \[N m/A\].
     pub constants: Option<BTreeMap<String, f64>>,
-    /// The joints, where there is no robot that has them.
+    /// The joints, if there is no robot that has them.
     pub joint_names: Option<Vec<String>>,
-    /// The robot, where it has been read already.
+    /// The robot, if it has been read already.
     pub model: Option<Model>,
     /// The corrected twin to start from.
     pub twin: Option<PathBuf>,
-    /// Topic of somebody else's twin.
+    /// Topic of an external twin.
     pub twin_topic: Option<String>,
-    /// Topic of the measured joint states; without it the one that gives efforts of most joints.
+    /// Topic of the measured joint states; by default the one with efforts of most joints.
     pub state_topic: Option<String>,
-    /// Recordings that may be fitted.
+    /// Recordings to fit.
     pub fit: Vec<PathBuf>,
-    /// Recordings that nothing is fitted on.
+    /// Recordings that are held out from the fit.
     pub holdout: Vec<PathBuf>,
-    /// Something wrong at a spot, in words.
+    /// Returns the problem with a title at a spot.
     pub problem: &'a dyn Fn(Spot<'_>, String) -> Problem,
 }
 
 impl Assembly<'_> {
-    /// Looks everything up.
+    /// Opens the files and creates the request.
     ///
     /// # Errors
-    /// Everything that is wrong.
+    /// All errors in the parts.
     pub fn request(
         self,
         case: Option<String>,
@@ -134,7 +134,7 @@ impl Assembly<'_> {
         })
     }
 
-    /// The recordings, each once and by a name of its own.
+    /// Returns the recordings, each once and with a unique name.
     fn recordings(&self, report: &mut Report) -> (Vec<Named>, Vec<Named>) {
         let mut seen = BTreeSet::new();
         let mut names = BTreeSet::new();
@@ -144,11 +144,11 @@ impl Assembly<'_> {
             let given = paths.iter().enumerate();
             let given = given.flat_map(|(index, path)| match recordings_at(path) {
                 Ok(recordings) => recordings.into_iter().map(|path| (index, path)).collect(),
-                // Whoever opens it says what is wrong.
+                // The error is reported when the recording is opened.
                 Err(_) => vec![(index, path.clone())],
             });
             for (index, path) in given {
-                // An episode of a data set is none of its files.
+                // An episode of a data set has no file of its own.
                 let absolute = || is_there(&path).then(|| std::path::absolute(&path).ok());
                 let canonical = path.canonicalize().ok().or_else(|| absolute().flatten());
                 let Some(canonical) = canonical else {
@@ -202,7 +202,7 @@ impl Assembly<'_> {
         }
     }
 
-    /// The first look at the first recording to fit: its topic, and the joints that are recorded.
+    /// Reads the topic and the joints of the first recording to fit.
     fn look(&self, joints: &[String], fit: &[Named]) -> Result<Look, Report> {
         let Some(first) = fit.first() else {
             return Err(Problem::new("there is no recording to fit").into());
@@ -252,7 +252,7 @@ impl Assembly<'_> {
         torque_constants(constants, joints, self.effort_unit, &problem, report)
     }
 
-    /// A twin to start from must be one of this robot, in this unit.
+    /// Checks that the twin to start from is one of this robot, in this unit.
     fn twin_fits(
         &self,
         file: &TwinFile,
@@ -276,7 +276,7 @@ impl Assembly<'_> {
         let stand_in;
         let model = match model {
             Some(model) if self.twin_topic.is_none() => model,
-            // Of a twin on a topic no more than the joints is known.
+            // Of an external twin only the joints are known.
             _ => {
                 stand_in = Model::massless(joints);
                 &stand_in
@@ -290,7 +290,7 @@ impl Assembly<'_> {
     }
 }
 
-/// The robot without the joints that no recording names, and the note on that.
+/// Returns the robot without the joints that no recording contains, and a note on this.
 fn as_recorded(
     robot: Option<(String, Model)>,
     recorded: &[String],
@@ -307,7 +307,8 @@ fn as_recorded(
     }
 }
 
-/// The file among `others` that is a copy of `path`. What cannot be read is told of by who opens it.
+/// Returns the file among `others` that is a copy of `path`. A file that cannot be read is reported when it is
+/// opened.
 fn same_bytes<'a>(path: &Path, others: &'a [PathBuf]) -> Option<&'a PathBuf> {
     let size = |path: &Path| {
         path.metadata()

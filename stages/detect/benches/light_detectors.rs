@@ -1,11 +1,11 @@
-//! What each detector that computes no net costs per sample, as a stage of its own, and what all of them
-//! cost behind one twin in one process, where they share what they derive alike, and where not; beside the floor, the
-//! inverse dynamics alone.
+//! Computing time per sample of the detectors without a network: of each detector as a separate stage, and of all
+//! detectors behind one twin in one process, with and without shared values. The inverse dynamics alone is the lower
+//! bound.
 //!
 //!     cargo bench -p tauscope-detect --bench light_detectors
 //!
-//! The bundled arm of 7 joints swings at 1 kHz. While an alarm lasts, link and force are estimated too: that
-//! is measured on the same motion under pushes.
+//! The bundled arm of 7 joints swings at 1 kHz. During an alarm, link and force are also estimated; this is
+//! measured on the same motion with pushes.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -26,13 +26,13 @@ use tauscope_dynamics::{Data, Model, rnea};
 
 const SAMPLES: i64 = 20_000;
 const STEP_NS: i64 = 1_000_000;
-/// Of each so many samples the last tenth is a push.
+/// Period of the pushes \[samples\]; a push lasts for the last tenth of it.
 const PUSH_EVERY: i64 = 2000;
 const PUSH_NM: f64 = 5.0;
-/// How often the samples are gone through.
+/// Number of passes over the samples.
 const ROUNDS: usize = 10;
 
-/// Takes detections and forgets all but the newest.
+/// Keeps the newest detection.
 #[derive(Default)]
 struct Slot(Detection);
 
@@ -44,7 +44,7 @@ impl Emit<Detection> for Slot {
     }
 }
 
-/// What a twin says of the swinging arm; `pushed` now and then.
+/// Returns a twin's samples of the swinging arm, with pushes if `pushed`.
 fn samples(model: &Model, pushed: bool) -> Vec<TwinState> {
     let n = model.dof();
     let mut data = Data::new(model);
@@ -80,7 +80,7 @@ fn samples(model: &Model, pushed: bool) -> Vec<TwinState> {
     (0..SAMPLES).map(sample).collect()
 }
 
-/// One configuration a detector.
+/// Returns one configuration per detector.
 fn configs(joints: usize, setup: &Setup, free: &[TwinState]) -> Vec<Config> {
     let free = [Lesson {
         name: "free".to_owned(),
@@ -143,7 +143,7 @@ fn timed(histogram: &mut Histogram<u64>, work: impl FnOnce()) {
     let _ = histogram.record(elapsed_ns(work));
 }
 
-/// A sample in the cache, as it is where a twin has just written it.
+/// Returns a copy of the sample that is in the cache, as it is after a twin has written it.
 fn warm(sample: &TwinState) -> TwinState {
     black_box(*sample)
 }

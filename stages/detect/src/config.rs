@@ -1,4 +1,4 @@
-//! The detector's part of the pipeline file. Which keys it may have, the [table](DETECTORS) says.
+//! The detector's part of the pipeline file. Its keys are the names in the [table](DETECTORS) of detectors.
 
 mod file;
 
@@ -12,10 +12,10 @@ use crate::frame::{
     AnySettings, ConfigError, Detect, Detector, DetectorSettings, Setup, State, Threshold,
 };
 
-/// The key under which a detector's settings hold what it has learnt.
+/// The key of the learnt state in a detector's settings.
 const LEARNT: &str = "learnt";
 
-/// A detector, and what all of them share.
+/// Configuration of the detect stage: a detector, and the settings that all detectors share.
 ///
 /// ```yaml
 /// twin_regression: {}
@@ -24,11 +24,11 @@ const LEARNT: &str = "learnt";
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Config {
-    /// The detectors that are given: one in a pipeline file, any number in a labelled set.
+    /// The configured detectors: one in a pipeline file, any number in a labelled set.
     pub detectors: Given,
-    /// When the alarm is raised.
+    /// Alarm threshold.
     pub threshold: Threshold,
-    /// An alarm ends once the score has stayed below the threshold for this long \[s\].
+    /// Time for which the score must stay below the threshold before an alarm ends \[s\].
     pub hold_s: f64,
 }
 
@@ -41,25 +41,25 @@ impl Default for Config {
         Self {
             detectors: Given::default(),
             threshold: Threshold::default(),
-            // Bridges the dip between two swings of one contact.
+            // Bridges the dip of the score between two oscillations of one contact.
             hold_s: 0.1,
         }
     }
 }
 
 impl Config {
-    /// The detector with these settings.
+    /// Returns the configuration of the detector with these settings.
     pub fn of(settings: impl DetectorSettings) -> Self {
         Self::default().with(settings)
     }
 
-    /// The same, with these settings of one detector.
+    /// Returns this configuration with the given settings of one detector.
     #[must_use]
     pub fn with(self, settings: impl DetectorSettings) -> Self {
         self.with_any(Box::new(settings))
     }
 
-    /// As [`with`](Self::with), of whichever detector.
+    /// [`with`](Self::with) for any detector.
     #[must_use]
     pub fn with_any(mut self, settings: Box<dyn AnySettings>) -> Self {
         let given = &mut self.detectors.0;
@@ -70,29 +70,29 @@ impl Config {
         self
     }
 
-    /// The settings of one kind, if they are given.
+    /// Returns the settings of type `S`, if they are given.
     pub fn settings<S: DetectorSettings>(&self) -> Option<&S> {
         let mut all = self.detectors.0.iter();
         all.find_map(|settings| (&**settings as &dyn Any).downcast_ref())
     }
 
-    /// The settings of `entry`'s detector, if they are given.
+    /// Returns the settings of `entry`'s detector, if they are given.
     pub fn given(&self, entry: &Entry) -> Option<&dyn AnySettings> {
         let mut all = self.detectors.0.iter();
         let settings = all.find(|settings| settings.name() == entry.name)?;
         Some(&**settings)
     }
 
-    /// Everything that is given, in the order of the table.
+    /// Returns the settings of all configured detectors, in the order of the table.
     pub fn all(&self) -> impl Iterator<Item = &dyn AnySettings> {
         self.detectors.0.iter().map(|settings| &**settings)
     }
 
-    /// The detect stage of a cell.
+    /// Builds the detect stage of a cell.
     ///
     /// # Errors
     /// If none or several detectors are given, the cell lacks what the detector needs, or no threshold can
-    /// be had.
+    /// be determined.
     pub fn stage(&self, setup: Setup) -> Result<Detect, ConfigError> {
         let settings = self.one()?;
         let detector = settings.build(&setup, self.hold_s)?;
@@ -101,7 +101,7 @@ impl Config {
         Detect::new(detector, (&self.threshold, sigmas), self.hold_s, setup)
     }
 
-    /// The one detector that is given, without its stage.
+    /// Builds the only configured detector, without its stage.
     ///
     /// # Errors
     /// If none or several are given, or the cell lacks what it needs.
@@ -118,12 +118,12 @@ impl Config {
         }
     }
 
-    /// The canonical name of the detector that is given, if it is one.
+    /// Returns the canonical name of the configured detector, if there is exactly one.
     pub fn name(&self) -> Option<&'static str> {
         Some(self.one().ok()?.name())
     }
 
-    /// Every detector whose score a calibration in this cell measures, with its usual settings.
+    /// Builds every detector whose score a calibration in this cell measures, with its default settings.
     ///
     /// # Errors
     /// If the cell lacks what one of them needs.
@@ -137,39 +137,39 @@ impl Config {
             .collect()
     }
 
-    /// What speaks against running this detector in this cell, though it can.
+    /// Returns a warning about running this detector in this cell, if there is one.
     pub fn warning(&self, setup: &Setup) -> Option<String> {
         self.all().find_map(|settings| settings.warning(setup))
     }
 
-    /// Whether the detector begins to learn anew when it is told to.
+    /// Returns whether the detector can learn anew on request.
     pub fn learns_when_told(&self) -> bool {
         self.all().any(AnySettings::learns_when_told)
     }
 
-    /// The file that keeps what the detector learns while running, where one is named. The program reads
-    /// and writes it.
+    /// Returns the path of the file for the state that the detector learns while running, if one is set. The program
+    /// reads and writes this file.
     pub fn state_mut(&mut self) -> Option<&mut PathBuf> {
         let mut all = self.detectors.0.iter_mut();
         all.find_map(|settings| settings.state_file()?.as_mut())
     }
 
-    /// Lets the detector go on from what an earlier life has learnt.
+    /// Restores the state that the detector learnt in an earlier run.
     ///
     /// # Errors
-    /// If that is the state of another detector.
+    /// If the state belongs to another detector.
     pub fn resume(&mut self, state: &State) -> Result<(), serde_json::Error> {
         let mut all = self.detectors.0.iter_mut();
         all.try_for_each(|settings| settings.resume(state.clone()))
     }
 
-    /// The files that hold what detectors have learnt, by detector, where they are named and have not been read.
+    /// Returns the files of learnt states that are named but not yet read, by detector.
     pub fn learnt_files(&self) -> impl Iterator<Item = (&'static str, &Path)> {
         self.all()
             .filter_map(|settings| Some((settings.name(), settings.learnt_file()?)))
     }
 
-    /// What the detector `name` has learnt, as [`resume`](Self::resume) takes it.
+    /// Returns the learnt state of the detector `name`, for [`resume`](Self::resume).
     pub fn learnt(&self, name: &str) -> Option<State> {
         let settings = self.all().find(|settings| settings.name() == name)?;
         let mut settings = serde_json::to_value(settings).ok()?;
@@ -177,7 +177,7 @@ impl Config {
         learnt.is_object().then_some(learnt)
     }
 
-    /// The files of trained detectors that are to be read into [`Setup::trained`], by detector.
+    /// Returns the files of trained detectors to be read into [`Setup::trained`], by detector.
     pub fn trained_files_mut(&mut self) -> impl Iterator<Item = (&'static str, &mut PathBuf)> {
         self.detectors.0.iter_mut().filter_map(|settings| {
             let name = settings.name();

@@ -1,5 +1,5 @@
-//! The table of detectors. Adding one is its file and one line here: the pipeline file's keys, their
-//! schema, `tauscope evaluate` and the tests of what all detectors promise go through this table.
+//! The table of detectors. A new detector needs its file and one line here: the pipeline file's keys, their
+//! schema, `tauscope evaluate` and the conformance tests of all detectors use this table.
 
 use schemars::{Schema, SchemaGenerator};
 
@@ -24,34 +24,34 @@ pub static DETECTORS: &[Entry] = &[
     Entry::of::<tauscope::Settings>(),
 ];
 
-/// What the table says of a detector; see [`DetectorSettings`].
+/// Entry of the table of detectors; see [`DetectorSettings`].
 #[derive(Debug)]
 pub struct Entry {
     /// Canonical name.
     pub name: &'static str,
-    /// What it is, in a sentence.
+    /// Description in one sentence.
     pub about: &'static str,
-    /// Standard deviations from the mean score to its alarm where the file names no threshold.
+    /// Default threshold, in standard deviations above the mean score.
     pub sigmas: f64,
-    /// What its score is measured in.
+    /// Unit of its score.
     pub score_unit: ScoreUnit,
-    /// What its training is.
+    /// Kind of its training.
     pub training: Training,
-    /// Whether chance has a part in its training.
+    /// Whether its training is random.
     pub random: bool,
-    /// Which recordings it is made for.
+    /// Recordings for which it is intended.
     pub suits: Suits,
-    /// Whether a calibration in this cell measures what its score does.
+    /// Whether a calibration in this cell measures the statistics of its score.
     pub is_calibrated: fn(&Setup) -> bool,
-    /// What its score stays below whatever is seen, where there is such a bound.
+    /// Upper bound of its score on any input, if there is one.
     pub largest_score: fn(&Trained) -> Option<f64>,
-    /// Its settings where a file says nothing.
+    /// Its default settings.
     pub settings: fn() -> Box<dyn AnySettings>,
-    /// Its settings as a file has them.
+    /// Reads its settings from a file.
     pub(crate) read: Read,
-    /// Their schema.
+    /// Schema of its settings.
     pub(crate) schema: fn(&mut SchemaGenerator) -> Schema,
-    /// The schema of what it learns while running, if it does.
+    /// Schema of the state that it learns while running, if it learns.
     pub(crate) state_schema: fn(&mut SchemaGenerator) -> Option<Schema>,
 }
 
@@ -61,7 +61,7 @@ type Read = fn(
 ) -> Result<Box<dyn AnySettings>, erased_serde::Error>;
 
 impl Entry {
-    /// The entry of the detector with these settings.
+    /// Returns the entry of the detector with settings of type `S`.
     const fn of<S: DetectorSettings>() -> Self {
         Self {
             name: S::NAME,
@@ -80,7 +80,7 @@ impl Entry {
         }
     }
 
-    /// The detector called `name`.
+    /// Finds the detector called `name`.
     pub fn find(name: &str) -> Option<&'static Self> {
         DETECTORS.iter().find(|entry| entry.name == name)
     }

@@ -1,14 +1,14 @@
-//! What all detectors share. In go a twin's samples, out comes a verdict for each:
+//! The parts that all detectors share. The input is a twin's samples, the output a verdict for each:
 //!
-//! - [`detector`]: what a detector is: a score a sample, perhaps a verdict of its own.
-//! - [`settings`]: what a detector tells of itself: name, settings, how it is built and how it learns.
-//! - [`stage`]: a detector as a stage of the pipeline, with its [`threshold`], the beginning and end of an
+//! - [`detector`]: the trait of a detector: one score per sample, and optionally a verdict by its own rules.
+//! - [`settings`]: the static properties of a detector: name, settings, construction and training.
+//! - [`stage`]: a detector as a stage of the pipeline, with its [`threshold`], the start and end of an
 //!   alarm ([`events`]), the loaded joints ([`loaded`]) and the touched link ([`isolation`]).
-//! - [`here_or_file`]: a setting that may stand in a file of its own.
-//! - [`setup`]: what a detector must know of its cell; [`lesson`]: what it learns from; [`trained`]: the file of
-//!   trained weights; [`sweep`]: what the thresholds of a tuned detector trade against each other.
-//! - [`momentum`] and [`discriminant`]: methods that detectors of several papers use; [`shared`]: what detectors of
-//!   one stream derive alike, derived once; [`rate`] and [`joints`]: whether what was learnt belongs to this stream.
+//! - [`here_or_file`]: a setting that may be kept in a file of its own.
+//! - [`setup`]: the facts about the cell that a detector needs; [`lesson`]: its training data; [`trained`]: the file
+//!   of trained weights; [`sweep`]: trade-off curves of the thresholds of a tuned detector.
+//! - [`momentum`] and [`discriminant`]: methods that detectors of several papers use; [`shared`]: values common to
+//!   the detectors of one stream, computed once; [`rate`] and [`joints`]: checks that learnt data fits this stream.
 //!
 //! The threshold is equation 7 of Tajiri and Iwamoto, the isolation sections V and VI of Haddadin, De Luca and
 //! Albu-Schäffer, "Robot Collisions: A Survey on Detection, Isolation, and Identification", 2017.

@@ -1,13 +1,13 @@
-//! Contacts and collisions from the residual. One detector, one file, in the folder of its paper: it
-//! turns a twin's sample into a score, and the frame around all of them ([`Detect`]) does what they
-//! share: the threshold, the beginning and end of an alarm, which joints and which link.
+//! Detection of contacts and collisions from the residual. Each detector is one file in the folder of its
+//! paper and turns a twin's sample into a score. The stage around it ([`Detect`]) does what all detectors
+//! share: the threshold, the start and end of an alarm, the loaded joints and the touched link.
 //!
 //! ```
 //! use tauscope_bus::{Detection, Emit, LinkError, Stage as _, TwinState, flags};
 //! use tauscope_detect::tajiri::twin_regression;
 //! use tauscope_detect::{Config, JointSetup, Setup, Threshold};
 //!
-//! /// Prints where an alarm begins.
+//! /// Prints the start of each alarm.
 //! struct Onsets;
 //! impl Emit<Detection> for Onsets {
 //!     fn emit(&mut self, write: &mut dyn FnMut(&mut Detection)) -> Result<(), LinkError> {
@@ -22,7 +22,7 @@
 //!
 //! let joint = JointSetup { gain: 1.0, offset: 0.0, noise: Some(0.1), effort_per_nm: 1.0 };
 //! let cell = Setup { joints: vec![joint; 2], ..Setup::default() };
-//! // An alarm where the squared length of the residual reaches 4 (N m)².
+//! // The alarm is raised when the squared length of the residual reaches 4 (N m)².
 //! let config = Config {
 //!     threshold: Threshold { score: Some(4.0), sigmas: None },
 //!     ..Config::of(twin_regression::Settings::default())
@@ -33,7 +33,7 @@
 //! sample.header.flags = flags::READY;
 //! for step in 0..100 {
 //!     sample.header.stamp_ns = step * 10_000_000;
-//!     // Something pushes joint 1 from the 50th sample on.
+//!     // A contact loads joint 1 from the 50th sample on.
 //!     sample.residual[0] = if step < 50 { 0.0 } else { -3.0 };
 //!     stage.accept(&sample, &mut Onsets)?;
 //! }

@@ -1,28 +1,36 @@
-//! `tauscope`: the residual held against what it usually is.
+//! `tauscope`: compares the residual with its contact-free baseline.
 //!
-//! The noise of a residual is not the same in every joint, at every speed and over every length of time:
-//! friction is least certain where a joint turns round, joints err together, and what is small beside
-//! one sample is large beside the mean of thirty. All of that is learnt from contact-free recordings
-//! ([`Learnt`]). Friction that the twin leaves out, and how late the twin is, are learnt first, and taken away ([`LearntUsual`]).
-//! What the change of velocity explains at once, and the twin's low-passed acceleration later, is no contact. The score is the largest, over windows of 10 ms to 0.2 s, of the Mahalanobis length of the mean residual, in
-//! units of what that window's length reaches at most in one of a thousand contact-free samples. Slow drift (warming up)
-//! is followed while nothing touches the robot.
+//! The noise of a residual depends on the joint, on its speed and on the averaging time. Friction is least certain
+//! where a joint reverses, and the errors of different joints are correlated. A residual that is small compared with
+//! the noise of one sample can be large compared with the noise of a mean over thirty. All of this is learnt from
+//! contact-free recordings ([`Learnt`]). The friction that the twin leaves out and the lag of the twin are learnt
+//! first and subtracted ([`LearntUsual`]). Inertial effort that the change of velocity explains, and the twin's
+//! low-passed acceleration shows only later, does not count as a contact.
 //!
-//! The threshold is set by a wish: so many false alarms an hour. How often the score exceeds what by chance is
-//! extrapolated from its peaks in contact-free data ([`Tail`]), and known better the longer it runs (`going_on`).
+//! The score is computed from the mean residual over windows of 10 ms to 0.2 s. For each window, the squared
+//! Mahalanobis length of the mean is divided by the value that one of a thousand contact-free samples exceeds. The
+//! score is the largest of these ratios. Slow drift (warming up) is followed while nothing touches the robot.
 //!
-//! Where labels tell collisions from cooperations, what parts them is learnt, too ([`Kinds`]).
+//! The threshold follows from the tolerated number of false alarms per hour. The rate at which chance exceeds a score
+//! is extrapolated from the score's peaks in contact-free data ([`Tail`]). This estimate improves while the detector
+//! runs (`going_on`).
 //!
-//! With a standing arm, a contact is over where most of it has gone and the rest is steady: static friction may hold that.
+//! If the labels distinguish collisions from cooperations, a linear discriminant between them is learnt, too
+//! ([`Kinds`]).
 //!
-//! The touched link is the one whose force explains the whitened residual best, the point of contact
-//! sought along the link (Haddadin, De Luca and Albu-Schäffer, "Robot Collisions: A Survey on Detection,
-//! Isolation, and Identification", 2017, sections V and VI).
+//! A contact with a stationary arm is over once most of it has vanished and the remaining residual is steady: static
+//! friction may hold the remaining residual.
 //!
-//! Each constant says where its value comes from, in the last sentence of its doc comment: `Physical:` a source, `Statistical:` a
-//! derivation, `Tuned:` on which data. Those tuned "on the sets named in `tauscope`" were chosen with simulated sets in view, drawn by
-//! `tests/contacts/assembly.py` and `tests/contacts/paths.py` with the seeds 301 to 323, 401 to 406, 432 to 434, 451 to 456 and 501 to
-//! 508, by `tauscope evaluate set.yaml --out results --detectors tauscope`. How flat their optimum is was not measured then.
+//! The touched link is the one whose force explains the whitened residual best. The point of contact is searched
+//! along the link (Haddadin, De Luca and Albu-Schäffer, "Robot Collisions: A Survey on Detection, Isolation, and
+//! Identification", 2017, sections V and VI).
+//!
+//! The last sentence of a constant's doc comment says where its value comes from: `Physical:` a source,
+//! `Statistical:` a derivation, `Tuned:` the data. Constants tuned "on the sets named in `tauscope`" were chosen with
+//! simulated sets in view. These sets were drawn by `tests/contacts/assembly.py` and `tests/contacts/paths.py` with
+//! the seeds 301 to 323, 401 to 406, 432 to 434, 451 to 456 and 501 to 508, and judged by
+//! `tauscope evaluate set.yaml --out results --detectors tauscope`. The sensitivity of the results to these constants
+//! was not measured then.
 
 mod alarm;
 mod going_on;
@@ -73,18 +81,18 @@ use windows::Windows;
 /// Canonical name.
 pub(crate) const NAME: &str = "tauscope";
 
-/// A contact's kind where none is told.
+/// State of a contact that is not classified.
 const UNTOLD: &str = "contact";
-/// A contact is felt so much before its alarm is on its way \[ns\].
+/// Time by which a contact precedes its threshold crossing; the rise of the residual is measured from there \[ns\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
 const FELT_NS: i64 = 3_000_000;
-/// How the tool moved is told from so long before that to so long before it \[ns\].
+/// Window before the threshold crossing over which the joint velocities are averaged, as (start, end) \[ns\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
 const MOVED_NS: [i64; 2] = [28_000_000, 7_000_000];
-/// For so many samples it is kept how the joints moved.
+/// Number of samples for which the joint velocities are kept.
 /// Physical: holds the 28 ms of [`MOVED_NS`] up to 4.5 kHz; arms are read at 1 kHz and less.
 const MOVED: usize = 128;
-/// A score above this is not taken for drift: the unit, what one of a thousand contact-free samples exceeds.
+/// Score above which a residual is not treated as drift: one of a thousand contact-free samples exceeds it.
 /// Statistical: the unit of the score.
 const DRIFT: f64 = 1.0;
 
@@ -98,18 +106,19 @@ pub struct Settings {
     /// Time constant with which slow drift of the residual is followed \[s\].
     #[schemars(range(min = 1.0, max = 86_400.0))]
     pub drift_s: f64,
-    /// The mean residual of so many seconds after each start is taken for an offset, in which nothing may touch
-    /// the robot \[s\]; 0 for none.
+    /// Duration after each start over which the mean residual is taken as an offset \[s\]. Nothing may touch the
+    /// robot during this time. 0 turns it off.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub offset_from_first_s: f64,
-    /// What contact-free recordings have taught, or the file that holds it: `learnt.yaml` as `tauscope init` and
+    /// State learnt from contact-free recordings, or the file that holds it: `learnt.yaml` as `tauscope init` and
     /// `tauscope evaluate` write it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learnt: Option<HereOrFile<Learnt>>,
-    /// Whether it goes on learning while it runs: the more contact-free time it has seen, the lower its threshold may be.
+    /// Whether the detector continues to learn while it runs. Its threshold can fall as it sees more contact-free
+    /// time.
     pub keep_learning: bool,
-    /// A file that keeps what it learns while it runs from one run to the next; it need not exist yet, and goes before
-    /// `learnt`.
+    /// File that keeps what the detector learns while it runs from one run to the next. It need not exist yet. It
+    /// takes precedence over `learnt`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub state: Option<PathBuf>,
 }
@@ -129,7 +138,8 @@ impl Default for Settings {
 
 impl DetectorSettings for Settings {
     const NAME: &'static str = NAME;
-    const ABOUT: &'static str = "The residual held against what it usually is: our own.";
+    const ABOUT: &'static str =
+        "The project's own detector: compares the residual with its contact-free baseline.";
     const TRAINING: Training = Training::Own;
 
     fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
@@ -190,10 +200,11 @@ impl DetectorSettings for Settings {
     }
 }
 
-/// Learns from contact-free stretches of all recordings, and what parts the kinds from the training recordings' contacts.
+/// Learns the baseline from the contact-free stretches of all recordings, and the discriminant between the kinds from
+/// the contacts of the training recordings.
 ///
 /// # Errors
-/// If they hold too little.
+/// If the recordings hold too few contact-free samples.
 pub fn learn(
     settings: &Settings,
     setup: &Setup,
@@ -210,7 +221,7 @@ pub fn learn(
 }
 
 impl Settings {
-    /// What contact-free recordings have taught, once it has been read.
+    /// Returns the state learnt from contact-free recordings, once it has been read.
     pub fn learnt(&self) -> Option<&Learnt> {
         self.learnt.as_ref()?.here()
     }
@@ -222,7 +233,8 @@ impl Settings {
         }
     }
 
-    /// By link, the smallest force that is found at `false_alarms_per_hour`; empty before anything is learnt.
+    /// Returns, by link, the smallest force that is found at `false_alarms_per_hour`; empty before anything is
+    /// learnt.
     pub fn smallest_forces(&self, false_alarms_per_hour: f64) -> Vec<Smallest> {
         let Some(learnt) = self.learnt() else {
             return Vec::new();
@@ -241,14 +253,14 @@ struct Tauscope {
     rate: Rate,
     late: Late,
     windows: Windows,
-    /// How the joints have moved \[rad/s\].
+    /// Recent joint velocities \[rad/s\].
     moved: Ring<MOVED>,
     place: Place,
     watch: Watch,
-    /// What further contact-free time tells of the threshold; nothing where it is not to go on.
+    /// Threshold estimate from further contact-free time; `None` if the detector does not continue to learn.
     going_on: Option<GoingOn>,
     kinds: Option<Kinds>,
-    /// Of the newest alarm, what kinds are told by, and what was told.
+    /// Measurements from which the newest alarm was classified, and (`state`) the result.
     measurements: Option<Vector6<f64>>,
     state: &'static str,
 }
@@ -281,7 +293,7 @@ impl Detector for Tauscope {
             self.watch.reset();
         }
         let free = self.watch.contact_ns().is_none();
-        // Whatever raises no alarm and is not far from usual may be drift.
+        // A residual may be drift if it raises no alarm and is not far from the baseline.
         let drifts = free.then_some(self.watch.threshold().min(DRIFT));
         let late = self.late.next(sample);
         let score = self.windows.score(sample, &late, drifts);
@@ -317,7 +329,7 @@ impl Detector for Tauscope {
 }
 
 impl Tauscope {
-    /// One that takes its time to tell the kinds if `tells_kinds`.
+    /// Creates a detector. With `tells_kinds` it delays its alarms until the contact can be classified.
     fn new(learnt: &Learnt, settings: &Settings, setup: &Setup, tells_kinds: bool) -> Self {
         let per_hour = settings.false_alarms_per_hour;
         let mut going_on = (settings.keep_learning).then(|| GoingOn::new(learnt, per_hour));
@@ -339,7 +351,7 @@ impl Tauscope {
         }
     }
 
-    /// Goes on learning from a score.
+    /// Continues to learn the threshold from a score.
     fn go_on(&mut self, sample: &TwinState, score: f64) {
         let Some(going_on) = &mut self.going_on else {
             return;
@@ -353,7 +365,7 @@ impl Tauscope {
         }
     }
 
-    /// Tells what can be told of a contact as its alarm is raised, which has been on its way since then.
+    /// Classifies a contact as its alarm is raised, which has been pending since `since_ns`.
     fn tell(&mut self, sample: &TwinState, since_ns: i64) {
         self.place.begin();
         let [from_ns, to_ns] = MOVED_NS.map(|before_ns| since_ns - before_ns);

@@ -1,6 +1,6 @@
-//! What every detector of the table promises, whichever it is.
+//! Conformance tests for every detector of the table.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 mod common;
 
@@ -18,7 +18,7 @@ use tauscope_dynamics::{Data, Model, forward_kinematics, point_jacobian};
 #[global_allocator]
 static ALLOCATOR: counting::Counting = counting::Counting;
 
-/// Samples a second.
+/// Sample rate \[Hz\].
 const RATE_HZ: i64 = 500;
 const STEP_NS: i64 = 1_000_000_000 / RATE_HZ;
 /// Two joints in a row, axes z and y.
@@ -32,7 +32,7 @@ const JOINTS: [&str; 2] = [
     r#"<joint name="b" type="continuous"><origin xyz="0 0 0.5"/><parent link="upper"/><child link="tool"/><axis xyz="0 1 0"/></joint>"#,
 ];
 
-/// The arm with its joints in the order a, b, or turned round.
+/// Returns a cell with the arm's joints in the order a, b, or reversed.
 fn setup(turned: bool) -> Setup {
     let order = if turned { [1, 0] } else { [0, 1] };
     let joints: String = order.map(|joint| JOINTS[joint]).concat();
@@ -53,8 +53,8 @@ fn setup(turned: bool) -> Setup {
     }
 }
 
-/// A swinging arm with a little noise from sample `from` on; a contact lasts for 0.3 s of every two, on the tool, against the motion
-/// of joint a and along with it in turns.
+/// Returns samples of a swinging arm with little noise, from sample `from` on. If `touched`, there is a contact on
+/// the tool for 0.3 s of every 2 s, alternately against the motion of joint a and along with it.
 fn swing(setup: &Setup, from: i64, samples: i64, touched: bool) -> Vec<TwinState> {
     let model = setup.model.as_ref().unwrap();
     let mut data = Data::new(model);
@@ -73,7 +73,7 @@ fn swing(setup: &Setup, from: i64, samples: i64, touched: bool) -> Vec<TwinState
             sample.velocity[j] = 0.4 * pace * cos;
             sample.acceleration[j] = -0.4 * pace * pace * sin;
             sample.expected_effort[j] = sin;
-            // Sines of paces that have nothing to do with one another.
+            // Sines of incommensurable frequencies.
             let noise = (0..5).map(|i| (17.3 * (i + 2) as f64 * t + (7 * joint + i) as f64).sin());
             sample.effort[j] = sin + 0.05 * noise.sum::<f64>();
         }
@@ -132,7 +132,7 @@ fn labels(samples: &[TwinState]) -> Vec<LabelledContact> {
     samples.windows(2).filter(on).map(contact).collect()
 }
 
-/// A detector that has learnt, ready to be built as often as wanted.
+/// A learnt detector that can be built repeatedly.
 struct Pupil {
     entry: &'static Entry,
     config: Config,
@@ -140,7 +140,7 @@ struct Pupil {
 }
 
 impl Pupil {
-    /// Lets a detector learn in a setup, quickly.
+    /// Trains a detector in a cell, with a short training.
     fn of(entry: &'static Entry, setup: &Setup) -> Self {
         let lesson = |name: &str, from: i64, touched: bool| {
             let samples = swing(setup, from, 24 * RATE_HZ, touched);
@@ -195,7 +195,7 @@ impl Pupil {
     }
 }
 
-/// The usual settings of a detector, but for what makes a training long.
+/// Returns the default settings of a detector, with a shorter training.
 fn quick(entry: &Entry) -> Box<dyn tauscope_detect::AnySettings> {
     let usual = Config::default().with_any((entry.settings)());
     let mut file = serde_json::to_value(&usual).unwrap();
@@ -220,7 +220,7 @@ fn run(stage: &mut Detect, samples: &[TwinState]) -> Result<Vec<Detection>, Stag
     Ok(out.0)
 }
 
-/// Every detector of the table.
+/// Returns every detector of the table, trained.
 fn pupils() -> &'static [Pupil] {
     static PUPILS: OnceLock<Vec<Pupil>> = OnceLock::new();
     PUPILS.get_or_init(|| {
@@ -229,7 +229,7 @@ fn pupils() -> &'static [Pupil] {
     })
 }
 
-/// Everything that is said, bit for bit.
+/// Returns the contents of the detections for comparison bit for bit.
 fn said(detections: &[Detection]) -> Vec<(u64, String, u32, i64, String, [u64; 3])> {
     let bits = |of: &Detection| {
         let state = of.state.as_str().to_owned();
@@ -277,7 +277,7 @@ fn a_reset_begins_anew() {
     after[0].header.flags |= flags::RESET;
     for pupil in pupils() {
         if pupil.entry.name == "virtual_collision_sensor" {
-            // What it learns while it runs is kept over a reset.
+            // Its learnt state survives a reset.
             continue;
         }
         let mut stage = pupil.stage();
@@ -322,7 +322,7 @@ fn behind_a_gap_every_score_is_finite_again() {
 
 #[test]
 fn a_reading_that_is_no_number_costs_its_sample_alone() {
-    // Ingest lets none through; no stage may be spoilt by one all the same.
+    // Ingest drops such samples; a stage must tolerate one nevertheless.
     let own = setup(false);
     let mut samples = swing(&own, 0, 4 * RATE_HZ, false);
     samples[1200].effort[1] = f64::NAN;
@@ -375,7 +375,7 @@ fn joints_in_another_order_give_the_same_scores() {
     );
     for pupil in pupils() {
         if pupil.entry.random {
-            // Which weight belongs to which joint is drawn by chance.
+            // Its initial weights are random and depend on the joint order.
             continue;
         }
         let other = Pupil::of(pupil.entry, &turned);
@@ -394,7 +394,7 @@ fn joints_in_another_order_give_the_same_scores() {
 #[test]
 fn nothing_is_allocated_per_sample() {
     let samples = swing(&setup(false), 0, 8 * RATE_HZ, true);
-    // By now every window is full and the band's bins are known.
+    // After this time every window is full and the band's bins are known.
     let (warm, rest) = samples.split_at(3 * RATE_HZ as usize);
     for pupil in pupils() {
         let mut stage = pupil.stage();

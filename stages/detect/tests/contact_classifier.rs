@@ -1,6 +1,6 @@
-//! The detectors after Salt Ducaju et al.: the stage on a made-up arm.
+//! The detectors after Salt Ducaju et al.: the stage on a synthetic arm.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::sync::LazyLock;
 
@@ -47,7 +47,7 @@ fn setup() -> Setup {
     }
 }
 
-/// Rows of the tool point's Jacobian: its velocity by joint.
+/// Linear Jacobian of the tool point, by joint.
 static JACOBIAN: LazyLock<[[f64; 3]; 3]> = LazyLock::new(jacobian);
 
 fn jacobian() -> [[f64; 3]; 3] {
@@ -65,7 +65,7 @@ fn jacobian() -> [[f64; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| linear(j)[i]))
 }
 
-/// The arm passes `Q` with joint velocities `qd`; a force on the tool point adds to what the twin expects.
+/// Returns a sample of the arm passing `Q` with joint velocities `qd`, with a force on the tool point.
 fn sample(ms: i64, qd: [f64; 3], force_n: [f64; 3]) -> TwinState {
     let mut sample = TwinState {
         header: Header {
@@ -105,13 +105,13 @@ fn run(config: &Config, samples: impl IntoIterator<Item = TwinState>) -> Vec<Det
     out.0
 }
 
-/// A force that rises within 30 ms from `at` on.
+/// Returns a force that rises within 30 ms from `at` on.
 fn ramp(ms: i64, at: i64, force_n: [f64; 3]) -> [f64; 3] {
     let share = ((ms - at) as f64 / 30.0).clamp(0.0, 1.0);
     force_n.map(|force| force * share)
 }
 
-/// Joint velocities, and a force of 20 N against (-1) or along (+1) the motion they give the tool.
+/// Returns joint velocities, and a force of 20 N against (-1) or along (+1) the resulting motion of the tool.
 fn moving(sense: f64) -> ([f64; 3], [f64; 3]) {
     let qd = [0.2, 0.3, -0.5];
     let velocity = JACOBIAN.map(|row| row.iter().zip(&qd).map(|(j, qd)| j * qd).sum::<f64>());
@@ -159,7 +159,7 @@ fn a_verdict_tells_of_the_norms_and_while_a_contact_lasts_of_both_directions() {
         let length = unit.iter().map(|x| x * x).sum::<f64>();
         assert!((length - 1.0).abs() < 1e-9);
     }
-    // Against each other: an obstacle.
+    // Opposite directions: an obstacle.
     let cosine: f64 = rise.iter().zip(motion).map(|(a, b)| a * b).sum();
     assert!(cosine < -0.8, "{cosine}");
 }
@@ -251,12 +251,12 @@ fn a_discriminant_that_has_learnt_nothing_does_not_run() {
     assert_eq!(error, Some(ConfigError::NotLearnt { detector }));
 }
 
-/// A recording with a force of this sense from 400 ms on for 300 ms.
+/// Returns a recording with a force of this sense from 400 ms on for 300 ms.
 fn lesson(sense: f64, kind: ContactKind) -> Lesson {
     let (qd, force) = moving(sense);
     let shape = |ms: i64| {
         let (up, down) = (ramp(ms, 400, force), ramp(ms, 670, force));
-        // What is left of a real arm's noise.
+        // Remaining noise of a real arm.
         std::array::from_fn(|i| up[i] - down[i] + 0.05 * (0.2 * ms as f64).sin())
     };
     Lesson {
@@ -283,7 +283,7 @@ fn tuning_finds_all_and_nothing_false_and_parts_the_kinds() {
     let learnt = contact_classifier::learn(settings, &setup(), &lessons).unwrap();
     let threshold = learnt.detection.force_threshold_n;
     assert!((0.005..0.2).contains(&threshold), "{threshold}");
-    // Parallel vectors have a ratio of √3; nothing limits γ above.
+    // Parallel vectors have a ratio of √3, and no contact bounds γ above: the paper's γ is chosen.
     assert!((learnt.gamma - 6.2).abs() < 1e-9, "{}", learnt.gamma);
     let sweeps = contact_classifier::sweeps(&learnt, &setup(), &lessons).unwrap();
     let at = |share: f64| {

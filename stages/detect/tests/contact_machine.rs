@@ -1,6 +1,6 @@
-//! Algorithm 1 of Salt Ducaju et al. on made-up norms.
+//! Algorithm 1 of Salt Ducaju et al. on synthetic norms.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use tauscope_detect::ContactKind;
 use tauscope_detect::salt_ducaju::contact_machine::{Machine, MachineSettings, NewContact, Rule};
@@ -8,7 +8,7 @@ use tauscope_detect::salt_ducaju::contact_signals::Instant;
 
 const MS: i64 = 1_000_000;
 
-/// Says one thing after another, and remembers what it was asked.
+/// A rule with prepared answers, which records the contacts that it classifies.
 struct Says {
     answers: Vec<ContactKind>,
     asked: Vec<NewContact>,
@@ -38,7 +38,7 @@ fn machine() -> Machine {
     Machine::new(&settings, 100)
 }
 
-/// At `ms`, with these norms and this force along z.
+/// Returns the instant at `ms`, with these norms and this force along z.
 fn instant(ms: i64, norms_n: [f64; 3], force_z: f64) -> Instant {
     Instant {
         stamp_ns: ms * MS,
@@ -49,7 +49,7 @@ fn instant(ms: i64, norms_n: [f64; 3], force_z: f64) -> Instant {
     }
 }
 
-/// The kinds after each millisecond of these norms.
+/// Returns the kinds after each millisecond of these norms.
 fn kinds(
     machine: &mut Machine,
     says: &mut Says,
@@ -80,7 +80,7 @@ fn a_contact_ends_where_all_norms_have_stayed_below_the_threshold() {
         let kinds = kinds(&mut machine(), says, &[(QUIET, 20), (X, 10), (QUIET, 20)]);
         assert_eq!(kinds[19], None);
         assert_eq!(kinds[20], Some(kind));
-        // The newest norm above it was at 29 ms, and 10 ms are waited.
+        // The newest norm above the threshold was at 29 ms; the contact is held for 10 ms.
         assert_eq!(kinds[39], Some(kind));
         assert_eq!(kinds[40], None);
         assert_eq!(says.asked.len(), 1);
@@ -122,7 +122,7 @@ fn a_cooperation_asks_no_more_until_it_has_ended() {
 #[test]
 fn the_search_goes_back_to_where_the_force_began_to_rise() {
     let (mut machine, mut says) = (machine(), Says::all(&[COLLISION]));
-    // Drifts down to 40 ms, rises by 0.5 N a millisecond from there, a wiggle on the way.
+    // Drifts down until 40 ms, then rises by 0.5 N per millisecond with a short dip.
     for ms in 0..60 {
         let rise = 0.5 * (ms - 40).max(0) as f64 - if ms == 50 { 0.9 } else { 0.0 };
         let force = 5.0 - 0.01 * ms.min(40) as f64 + rise;
@@ -130,7 +130,7 @@ fn the_search_goes_back_to_where_the_force_began_to_rise() {
         machine.step(&instant(ms, norms, force), &mut says);
     }
     let contact = says.asked[0];
-    // 15 % of the rise, less than 3 ms behind the trough.
+    // 15 % of the rise, less than 3 ms after the trough.
     assert_eq!(contact.contact_ns, 42 * MS);
     assert!((contact.rise_n[2] - 8.5).abs() < 1e-9);
     let (rise, velocity) = contact.along[2].unwrap();

@@ -1,7 +1,7 @@
-//! What is said of a contact depends on the kinematic tree, not on how the URDF is written: joints in another order, a
-//! gripper, a second arm on the same base or a mobile base below it change no answer.
+//! The detections of a contact depend on the kinematic tree and not on the notation of the URDF: joints in another
+//! order, a gripper, a second arm on the same base or a mobile base below the arm do not change them.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use crate::common::Out;
 use nalgebra::Vector3;
@@ -14,10 +14,10 @@ use tauscope_detect::{Config, JointSetup, Lesson, Lessons, Setup, Threshold, tau
 use tauscope_dynamics::{Data, Model, forward_kinematics, point_jacobian};
 
 const STEP_NS: i64 = 10_000_000;
-/// The contact lasts for these samples.
+/// Samples of the contact.
 const CONTACT: std::ops::Range<usize> = 1000..1060;
 
-/// The arm's joints: name, parent, child, axis, where the joint is on its parent.
+/// The arm's joints: name, parent, child, axis, origin on the parent.
 const ARM: [[&str; 5]; 4] = [
     ["a", "base", "shoulder", "0 0 1", "0 0 0"],
     ["b", "shoulder", "upper", "0 1 0", "0 0 0.3"],
@@ -38,11 +38,11 @@ const MOBILE_BASE: [[&str; 5]; 3] = [
     ["y", "slide_x", "slide_y", "0 1 0", "0 0 0"],
     ["yaw", "slide_y", "base", "0 0 1", "0 0 0.2"],
 ];
-/// Those that slide, and those whose effort tells no torque.
+/// Prismatic joints, and joints without a known torque.
 const SLIDES: [&str; 4] = ["left", "right", "x", "y"];
 const UNTOLD: [&str; 5] = ["left", "right", "x", "y", "yaw"];
 
-/// A robot of these joints, written in the order of `turn`.
+/// Returns a robot with these joints, written in the order of `turn`.
 fn robot(joints: &[[&str; 5]], turn: &[usize]) -> Model {
     let root = if joints.iter().any(|joint| joint[1] == "world") {
         "world"
@@ -52,7 +52,7 @@ fn robot(joints: &[[&str; 5]], turn: &[usize]) -> Model {
     let mut urdf = format!(r#"<robot name="r"><link name="{root}"/>"#);
     for &at in turn {
         let [name, parent, child, axis, origin] = joints[at];
-        // What is added to the arm weighs next to nothing: else it would change the effort that the motion requires.
+        // The additional links have negligible mass; otherwise they would change the effort that the motion requires.
         let mass_kg = if UNTOLD.contains(&name) { 1e-6 } else { 1.0 };
         let inertia_kgm2 = 0.01 * mass_kg;
         let kind = if SLIDES.contains(&name) {
@@ -68,18 +68,18 @@ fn robot(joints: &[[&str; 5]], turn: &[usize]) -> Model {
     Model::from_urdf(&(urdf + "</robot>")).unwrap()
 }
 
-/// What happens to the arm, whatever it is part of.
+/// Posture and contact of the arm, independent of the rest of the robot.
 #[derive(Debug, Clone)]
 struct Scene {
-    /// Of the arm's joints \[rad\].
+    /// Positions of the arm's joints \[rad\].
     posture: [f64; 4],
-    /// The touched link's place along the arm, the point on it \[m\], and the force \[N\].
+    /// Index of the touched link along the arm, point on it \[m\], and force \[N\].
     touched: usize,
     along_m: f64,
     force_n: [f64; 3],
 }
 
-/// Contact-free noise of the arm's joints, by `seed`, with the arm in a posture that wanders about the scene's.
+/// Returns contact-free samples with noise by `seed`; the arm's posture oscillates around that of the scene.
 fn quiet(model: &Model, scene: &Scene, seed: u64, samples: usize) -> Vec<TwinState> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let place = ARM.map(|joint| model.joint_index(joint[0]).unwrap());
@@ -101,7 +101,7 @@ fn quiet(model: &Model, scene: &Scene, seed: u64, samples: usize) -> Vec<TwinSta
     (0..samples).map(sample).collect()
 }
 
-/// Adds the contact: what the arm alone would feel of it.
+/// Adds the contact's torques at the arm's joints, computed for the arm alone.
 fn touch(model: &Model, scene: &Scene, samples: &mut [TwinState]) {
     let arm = robot(&ARM, &[0, 1, 2, 3]);
     let mut data = Data::new(&arm);
@@ -118,7 +118,7 @@ fn touch(model: &Model, scene: &Scene, samples: &mut [TwinState]) {
     }
 }
 
-/// What is said of the contact: when, on which link, at which joints, and every score.
+/// Detection of the contact: onsets, link and joints.
 #[derive(Debug, PartialEq)]
 struct Answer {
     onsets: Vec<usize>,
@@ -210,7 +210,7 @@ proptest! {
         seed: u64,
     ) {
         let plain = answers(&ARM, &[0, 1, 2, 3], &scene);
-        // A force that nearly passes through the joints' axes loads none of them: such a scene asks nothing.
+        // A force that nearly intersects all joint axes loads no joint: such a scene is skipped.
         prop_assume!(plain.iter().all(|(answer, _)| !answer.onsets.is_empty()));
         let mut joints = ARM.to_vec();
         joints.extend(GRIPPER.into_iter().filter(|_| gripper));

@@ -1,6 +1,6 @@
-//! The learned detectors: what they learn from a free arm marks a push, and a trained one can be kept.
+//! The learned detectors: trained on a contact-free arm, they detect a push, and their files can be saved and loaded.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -43,8 +43,8 @@ fn setup() -> Setup {
     setup_of(ARM)
 }
 
-/// An arm that swings, with friction that its twin does not know, at 100 Hz. From sample 900 to 930
-/// somebody pushes with `push` \[N m\] at joint b.
+/// Returns samples at 100 Hz of a swinging arm with friction that its twin does not model. From sample 900 to 930,
+/// joint b is pushed with `push` \[N m\].
 fn swing(samples: i64, phase: f64, push: f64) -> Vec<TwinState> {
     let state = |i: i64| {
         let t = i as f64 * 0.01;
@@ -100,7 +100,7 @@ fn quick(epochs: usize, batch: usize) -> TrainingSettings {
     }
 }
 
-/// Every detector that is trained, to be trained quickly, with how many samples a score rests on.
+/// Returns every learned detector with settings for a short training, and the number of samples behind its score.
 fn detectors() -> [(usize, Box<dyn AnySettings>); 5] {
     [
         (1, Box::new(point_ocsvm::Settings::default())),
@@ -133,7 +133,7 @@ fn detectors() -> [(usize, Box<dyn AnySettings>); 5] {
     ]
 }
 
-/// What a training gives.
+/// Trains a detector.
 fn train(
     settings: &dyn AnySettings,
     setup: &Setup,
@@ -149,7 +149,7 @@ fn train(
     Ok(settings.learn(&task)?.1.unwrap())
 }
 
-/// Every detector of [`detectors`], trained with seed 1.
+/// Returns every detector of [`detectors`], trained with seed 1.
 fn trained() -> &'static BTreeMap<&'static str, Trained> {
     static TRAINED: OnceLock<BTreeMap<&'static str, Trained>> = OnceLock::new();
     TRAINED.get_or_init(|| {

@@ -1,4 +1,4 @@
-//! One program of the tests through the public face: linking one is what takes long.
+//! All tests of the public interface in one program, because linking dominates the build time.
 
 mod common;
 mod contact_classifier;

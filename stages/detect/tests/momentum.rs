@@ -1,6 +1,6 @@
 //! The momentum observer on simulated arms.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 #![allow(clippy::float_cmp, reason = "tests compare what must be the same bits")]
 
 use tauscope_bus::{Header, TwinState, flags};
@@ -35,8 +35,8 @@ fn setup(effort_per_nm: f64) -> Setup {
     }
 }
 
-/// A swinging arm under constant motor torques, pushed from `push_s` on, with a twin that has friction
-/// and knows the acceleration only as `acceleration` of the true one.
+/// A swinging arm under constant motor torques, pushed from `push_s` on. Its twin has friction, and its acceleration
+/// is the true one times the factor `acceleration`.
 struct Arm {
     model: Model,
     data: Data,
@@ -63,7 +63,7 @@ impl Arm {
         }
     }
 
-    /// Goes on by `dt_ns` in fine steps and says what the twin would.
+    /// Simulates `dt_ns` in fine steps and returns the twin's sample.
     fn step(&mut self, dt_ns: i64) -> TwinState {
         let motor = [1.0, -4.0, -2.0];
         let fine = 20;

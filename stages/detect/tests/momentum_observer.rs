@@ -1,6 +1,6 @@
-//! `momentum_observer`: the score of an arm that rests, behind whatever regression the twin has.
+//! `momentum_observer`: the score of an arm at rest is independent of the twin's regression.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use tauscope_bus::{Header, TwinState, flags};
 use tauscope_detect::tajiri::momentum_observer;
@@ -30,7 +30,7 @@ fn config() -> Config {
     Config::of(momentum_observer::Settings::default())
 }
 
-/// A resting arm, `i` hundredths of a second in: the model says 3, the motor 5.
+/// Returns a sample of an arm at rest after `i` hundredths of a second: the model's effort is 3, the measured one 5.
 fn sample(i: i64, gain: f64, offset: f64) -> TwinState {
     let mut sample = TwinState {
         header: Header {

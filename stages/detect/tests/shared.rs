@@ -1,6 +1,6 @@
-//! Detectors that share what they derive say what they say alone.
+//! Detectors that share values give the same detections as alone.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use crate::common::Out;
 use tauscope_bus::{Detection, Stage, TwinState, flags};
@@ -19,7 +19,7 @@ const ARM: &str = r#"<robot name="arm">
   <joint name="b" type="continuous"><origin xyz="0 0 0.5"/><parent link="upper"/><child link="lower"/><axis xyz="0 1 0"/></joint>
 </robot>"#;
 
-/// Swings and pushes, with a new beginning and a repeated stamp within.
+/// Returns samples with swings and pushes, including a reset and a repeated stamp.
 fn samples() -> Vec<TwinState> {
     let sample = |k: i64| {
         let mut sample = TwinState::default();

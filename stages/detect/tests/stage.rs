@@ -1,6 +1,6 @@
-//! The detect stage: scores, thresholds, events, and which link was touched.
+//! The detect stage: scores, thresholds, events, and the touched link.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::collections::BTreeMap;
 
@@ -47,7 +47,7 @@ fn twin_regression() -> Config {
     Config::of(twin_regression::Settings::default())
 }
 
-/// A twin's sample at `i` hundredths of a second with this residual.
+/// Returns a twin's sample at `i` hundredths of a second with this residual.
 fn sample(i: i64, residual: [f64; 3]) -> TwinState {
     let mut sample = TwinState {
         header: Header {
@@ -143,7 +143,7 @@ fn naive_difference_undoes_gain_and_offset() {
     let mut detect = config.stage(setup()).unwrap();
     let mut at = sample(0, [0.0; 3]);
     for j in 0..3 {
-        // The model said 5; the twin made 2 * 5 + 1 of it; measured were 11.
+        // The model's effort is 5; the twin corrects it to 2 * 5 + 1; the measured effort is 11.
         at.filtered_expected_effort[j] = 11.0;
         at.filtered_effort[j] = 11.0;
     }
@@ -175,7 +175,7 @@ fn the_touched_link_and_the_force_are_found() {
         let verdict = run(&mut detect, [at])[0];
         assert_eq!(verdict.link.as_str(), name);
         assert!(verdict.header.has(flags::FORCE));
-        // Along the upper arm nothing is felt: there the force is as small as can be.
+        // The joints do not sense a force along the upper arm: the estimate is the smallest force that fits.
         let found = nalgebra::Vector3::from(verdict.force_n);
         assert!(found.norm() <= force.norm() * 1.01);
         assert!(

@@ -1,6 +1,6 @@
-//! `tauscope`, our own detector: learns what is usual, and is raised by what is not.
+//! `tauscope`, the project's own detector: learns the baseline, and raises an alarm for deviations from it.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use crate::common::{Out, setup};
 use nalgebra::Vector3;
@@ -16,7 +16,7 @@ use tauscope_dynamics::{Data, Model, forward_kinematics, point_jacobian};
 const JOINTS: usize = 3;
 const STEP_NS: i64 = 10_000_000;
 
-/// A minute of contact-free noise, twice as large where a joint is slow.
+/// Returns contact-free noise, twice as large where a joint is slow.
 fn quiet(seed: u64, samples: i64) -> Vec<TwinState> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     (0..samples)
@@ -29,7 +29,7 @@ fn quiet(seed: u64, samples: i64) -> Vec<TwinState> {
                 let speed = (0.01 * k as f64 + j as f64).sin();
                 let noise = if speed.abs() < 0.1 { 0.2 } else { 0.1 };
                 sample.velocity[j] = speed;
-                // Sum of uniform numbers: nearly Gaussian.
+                // A sum of uniform numbers is nearly Gaussian.
                 let sum: f64 = (0..12).map(|_| random.random_range(-0.5..0.5)).sum();
                 sample.effort[j] = noise * sum;
             }
@@ -86,7 +86,7 @@ fn a_contact_is_found_at_once_and_told_by_the_joint_that_felt_it() {
     assert_eq!(onsets.len(), 1, "{onsets:?}");
     assert!((1000..1005).contains(&onsets[0]), "{onsets:?}");
     assert_eq!(detections[onsets[0] + 3].joints, 0b010);
-    // The longest window is empty of it after 100 ms; a usual peak may hold the alarm for as long again.
+    // The push has left the longest window after 100 ms; a baseline peak may hold the alarm for another 100 ms.
     assert!(!detections[1100].alarm());
 }
 
@@ -110,7 +110,7 @@ fn slow_drift_is_no_contact() {
     }));
     let mut samples = quiet(4, 12_000);
     for (k, sample) in samples.iter_mut().enumerate() {
-        // As much as twice the noise, over two minutes.
+        // Up to twice the noise, over two minutes.
         sample.effort[0] += 0.2 * k as f64 / 12_000.0;
     }
     assert!(onsets(&run(&mut detector, &samples)).is_empty());
@@ -218,7 +218,7 @@ fn what_was_learnt_at_one_rate_does_not_judge_another_and_ends_where_there_is_no
     let mut out = Out::default();
     let error = (slow.iter()).find_map(|sample| stage.accept(sample, &mut out).err());
     let error = error.unwrap().to_string();
-    // A spell of a few seconds is waited through.
+    // A wrong rate is tolerated for a few seconds.
     assert!((300..600).contains(&out.0.len()), "{}", out.0.len());
     assert!(out.0.iter().all(|it| !it.header.has(flags::READY)));
     assert!(error.contains("and here are 50.0"), "{error}");
@@ -242,7 +242,7 @@ fn four_minutes_of_training_keep_a_wish_under_slow_drift() {
         train: &train,
         validation: &[],
     };
-    // Five an hour by default.
+    // The default is five false alarms per hour.
     let learnt = tauscope::learn(&tauscope::Settings::default(), &setup(JOINTS), &lessons).unwrap();
     let mut alarms = 0;
     for seed in 20..30 {
@@ -252,7 +252,7 @@ fn four_minutes_of_training_keep_a_wish_under_slow_drift() {
         }
         alarms += onsets(&run(&mut detector(learnt.clone()), &samples)).len();
     }
-    // 1.7 are to be expected in twenty minutes.
+    // The expected number in twenty minutes is 1.7.
     assert!(alarms <= 5, "{alarms} alarms");
 }
 
@@ -302,7 +302,7 @@ fn the_smallest_force_grows_with_the_wish_and_falls_along_the_arm() {
         smallest.iter().map(|of_link| of_link.half_n).collect()
     };
     let (often, weekly) = (half(60.0), half(0.006));
-    // The first link turns about its own axis, and feels what acts a little beside it.
+    // The first link turns about its own axis: its joint senses only forces with a small lever.
     let all: Option<Vec<f64>> = often.iter().copied().collect();
     let all = all.unwrap();
     assert!(all[0] > all[1] && all[1] > all[2], "{often:?}");
@@ -312,7 +312,7 @@ fn the_smallest_force_grows_with_the_wish_and_falls_along_the_arm() {
     );
 }
 
-/// A minute in which the lower link is touched every two seconds while it goes round: against its motion, or along
+/// Returns a minute in which the lower link rotates and is touched every two seconds: against its motion, or along
 /// with it.
 fn touched(seed: u64) -> Lesson {
     let model = Model::from_urdf(ARM).unwrap();
@@ -331,7 +331,7 @@ fn touched(seed: u64) -> Lesson {
         let force = 30.0 * sense;
         let mut torque = [0.0; 3];
         let point = Vector3::new(0.0, 0.0, 0.4);
-        // Force along the point's motion, which the first joint alone gives it.
+        // Force along the point's motion, which only the first joint causes.
         let along = Vector3::new(-sample.position[0].sin(), sample.position[0].cos(), 0.0);
         point_jacobian(&model, &data, 3, &point, |j, linear, _| {
             torque[j] = linear.dot(&along) * force;
@@ -356,7 +356,7 @@ fn touched(seed: u64) -> Lesson {
     lesson
 }
 
-/// The detector after these training recordings.
+/// Returns the detector trained on these recordings.
 fn taught_by(train: &[Lesson]) -> Detect {
     let lessons = Lessons {
         train,
@@ -435,7 +435,7 @@ fn a_joint_that_never_stirred_while_it_learnt_is_not_believed_to_be_without_nois
     assert!(still > 0.01 * moved, "{still} {moved}");
 }
 
-/// Pushes at `points` of links in turn, half a second each second, in all directions; the link of each.
+/// Returns samples with pushes at `points` of links in turn, in all directions, and the link of each push.
 fn pushed(points: &[(&'static str, usize, Vector3<f64>)]) -> (Vec<TwinState>, Vec<&'static str>) {
     let model = Model::from_urdf(ARM).unwrap();
     let mut data = Data::new(&model);

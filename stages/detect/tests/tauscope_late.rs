@@ -1,6 +1,6 @@
-//! `tauscope` behind a twin whose acceleration comes late.
+//! `tauscope` behind a twin with a delayed acceleration.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use crate::common::Out;
 use rand::{Rng, SeedableRng};
@@ -15,7 +15,7 @@ const ARM: &str = r#"<robot name="arm"><link name="base"/>
   <joint name="joint1" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/></joint>
 </robot>"#;
 const INERTIA_KG_M2: f64 = 0.6;
-/// The twin's acceleration follows with this time constant \[s\].
+/// Time constant of the twin's acceleration \[s\].
 const LATE_S: f64 = 0.02;
 const STEPS: usize = 10;
 
@@ -26,7 +26,8 @@ fn setup(knows_arm: bool) -> Setup {
     }
 }
 
-/// An arm that swings, and accelerates by `also` at a time \[s, rad/s²\] besides; noise of 0.05 N m.
+/// Returns samples of a swinging arm with an additional acceleration `also` over time \[s, rad/s²\] and noise of
+/// 0.05 N m.
 fn swinging(seed: u64, seconds: usize, also: impl Fn(f64) -> f64) -> Vec<TwinState> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let phase: f64 = random.random_range(0.0..6.0);
@@ -54,7 +55,7 @@ fn swinging(seed: u64, seconds: usize, also: impl Fn(f64) -> f64) -> Vec<TwinSta
         .collect()
 }
 
-/// How often it sees a contact in `samples`, learnt from an arm that swings.
+/// Returns the number of contacts that a detector, trained on a swinging arm, detects in `samples`.
 fn onsets(setup: &Setup, samples: &[TwinState]) -> usize {
     let lesson = |seed| Lesson {
         name: "rec".to_owned(),
@@ -77,7 +78,7 @@ fn onsets(setup: &Setup, samples: &[TwinState]) -> usize {
     out.0.iter().filter(is_onset).count()
 }
 
-/// At 10 s it leaps forward and stops again.
+/// Returns the acceleration of an arm that jerks forward at 10 s and stops again \[rad/s²\].
 fn leap(time_s: f64) -> f64 {
     match time_s {
         10.0..10.2 => 6.0 * (std::f64::consts::TAU * (time_s - 10.0) / 0.2).sin(),
@@ -89,14 +90,14 @@ fn leap(time_s: f64) -> f64 {
 fn an_arm_that_leaps_as_it_never_did_is_not_touched() {
     let leaps = swinging(9, 20, leap);
     assert_eq!(onsets(&setup(true), &leaps), 0);
-    // The residual alone tells no leap from a contact.
+    // The residual alone does not distinguish a jerk from a contact.
     assert!(onsets(&setup(false), &leaps) > 0);
 }
 
 #[test]
 fn what_stops_an_arm_is_a_contact() {
     let mut samples = swinging(9, 20, leap);
-    // Where it leaps no effort drives it: something else does.
+    // The measured effort does not drive the jerk: an external force does.
     for sample in &mut samples[1000..1020] {
         sample.effort[0] = sample.expected_effort[0];
     }

@@ -1,4 +1,4 @@
-//! `tauscope`: joints and link of a contact follow from all its samples.
+//! `tauscope`: joints and link of a contact are determined from all its samples.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -13,10 +13,10 @@ use tauscope_dynamics::{Data, Model, forward_kinematics, point_jacobian};
 const JOINTS: usize = 4;
 const STEP_NS: i64 = 10_000_000;
 const POSTURE: [f64; JOINTS] = [0.4, 0.8, 0.6, 0.3];
-/// The contact lasts for these samples.
+/// Samples of the contact.
 const CONTACT: std::ops::Range<usize> = 1000..1060;
 
-/// An arm of half a metre a link with a short hand.
+/// An arm with links of half a metre and a short hand.
 const ARM: &str = r#"<robot name="arm">
   <link name="base"/>
   <link name="shoulder"><inertial><origin xyz="0 0 0.1"/><mass value="3"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
@@ -47,7 +47,8 @@ fn quiet(seed: u64, samples: usize) -> Vec<TwinState> {
     (0..samples).map(sample).collect()
 }
 
-/// A push of 25 N on the forearm, with this extra effort of the last joint in the contact's sample `k` \[N m\].
+/// Returns the detected contact for a push of 25 N on the forearm, with this extra effort of the last joint in the
+/// contact's sample `k` \[N m\].
 fn contact(extra_nm: impl Fn(usize) -> f64) -> Contact {
     let model = Model::from_urdf(ARM).unwrap();
     let cell = Setup {
@@ -126,7 +127,7 @@ fn a_joint_that_carries_nothing_of_a_push_is_not_listed() {
 
 #[test]
 fn eight_erring_samples_of_an_outer_joint_move_neither_joints_nor_link() {
-    // As when that joint reverses: its friction is known least there.
+    // As during a reversal of that joint, where its friction is least certain.
     let contact = contact(|k| if (20..28).contains(&k) { 0.6 } else { 0.0 });
     assert_eq!(contact.joints, 0b0111);
     assert_eq!(contact.link.as_str(), "fore");

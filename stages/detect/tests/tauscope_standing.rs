@@ -1,6 +1,6 @@
-//! `tauscope` at a standing arm, whose joints friction holds wherever it likes.
+//! `tauscope` on an arm at standstill, where static friction takes any value within its limits.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use crate::common::{Out, setup};
 use rand::{Rng, SeedableRng};
@@ -11,12 +11,12 @@ use tauscope_detect::{Config, Detect, Lesson, Lessons, tauscope};
 const JOINTS: usize = 3;
 const STEP_NS: i64 = 10_000_000;
 
-/// What friction holds in each joint where it comes to rest: nobody knows.
+/// Draws the unknown static friction of each joint after the arm has come to rest.
 fn held(random: &mut ChaCha8Rng) -> [f64; JOINTS] {
     std::array::from_fn(|_| random.random_range(-2.0..2.0))
 }
 
-/// An arm that stands for 6 s and moves for 4 s by turns.
+/// Returns samples of an arm that alternately stands for 6 s and moves for 4 s.
 fn arm(seed: u64, seconds: i64) -> Vec<TwinState> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut friction = held(&mut random);
@@ -38,7 +38,7 @@ fn arm(seed: u64, seconds: i64) -> Vec<TwinState> {
                 sample.velocity[j] = speed;
                 let noise: f64 = (0..12).map(|_| random.random_range(-0.5..0.5)).sum();
                 let error = if moves {
-                    // What the twin does not know of friction in motion.
+                    // Friction in motion that the twin does not model.
                     1.5 * (0.05 * k as f64 + j as f64).sin()
                 } else {
                     *held
@@ -50,7 +50,7 @@ fn arm(seed: u64, seconds: i64) -> Vec<TwinState> {
         .collect()
 }
 
-/// One that has seen an arm stand and move.
+/// Returns a detector trained on an arm that stands and moves.
 fn detector() -> Detect {
     taught_by(|seed| arm(seed, 60))
 }
@@ -72,7 +72,7 @@ fn taught_by(arm: impl Fn(u64) -> Vec<TwinState>) -> Detect {
     config.stage(setup(JOINTS)).unwrap()
 }
 
-/// When alarms begin and end \[s\].
+/// Returns the start and end of each alarm \[s\].
 fn alarms(samples: &[TwinState]) -> Vec<(f64, f64)> {
     alarms_of(detector(), samples)
 }
@@ -110,7 +110,7 @@ fn where_a_push_leaves_friction_otherwise_than_it_was_it_is_over_all_the_same_an
     let mut samples = arm(7, 6);
     for (k, sample) in samples.iter_mut().enumerate().skip(250) {
         let pushed = k < 320 || (450..520).contains(&k);
-        // After a push a third of it has stayed, the other way round, and creeps back.
+        // After a push, a third of it remains with the opposite sign and decays.
         let creep = if k < 320 {
             0.0
         } else {
@@ -133,11 +133,11 @@ fn where_a_push_leaves_friction_otherwise_than_it_was_it_is_over_all_the_same_an
 #[test]
 fn an_arm_that_comes_to_rest_and_starts_again_is_hardly_ever_taken_for_touched() {
     let alarms = alarms(&arm(11, 300));
-    // Five an hour are the wish: in five minutes none, or one by chance.
+    // At the tolerated five false alarms per hour, five minutes have none, or one by chance.
     assert!(alarms.len() <= 1, "{alarms:?}");
 }
 
-/// An arm of which the twin knows all but the noise: always on its way, or standing.
+/// Returns samples of an arm whose twin is exact except for noise; it always moves, or always stands.
 fn known(seed: u64, seconds: i64, stands: bool) -> Vec<TwinState> {
     let mut samples = arm(seed, seconds);
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -151,7 +151,7 @@ fn known(seed: u64, seconds: i64, stands: bool) -> Vec<TwinState> {
     samples
 }
 
-/// By one that has never seen an arm stand.
+/// Returns the alarms of a detector trained without standstill.
 fn alarms_unseen(samples: &[TwinState]) -> Vec<(f64, f64)> {
     alarms_of(taught_by(|seed| known(seed, 30, false)), samples)
 }

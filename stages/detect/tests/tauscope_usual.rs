@@ -1,6 +1,6 @@
-//! `tauscope` behind a twin that knows no friction and comes late.
+//! `tauscope` behind a twin without friction and with delay.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use crate::common::{Out, setup};
 use rand::{Rng, SeedableRng};
@@ -11,7 +11,7 @@ use tauscope_detect::{Config, Lesson, Lessons, tauscope};
 const JOINTS: usize = 2;
 const STEP_NS: i64 = 10_000_000;
 
-/// An arm whose joints swing, with noise of 0.05 and whatever `rubs` says at a velocity and a time \[s\].
+/// Returns samples of an arm with swinging joints, noise of 0.05 and friction `rubs` by velocity and time \[s\].
 fn swinging(seed: u64, seconds: i64, rubs: impl Fn(f64, f64) -> f64) -> Vec<TwinState> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let phases: [f64; JOINTS] = std::array::from_fn(|_| random.random_range(0.0..6.0));
@@ -32,7 +32,7 @@ fn swinging(seed: u64, seconds: i64, rubs: impl Fn(f64, f64) -> f64) -> Vec<Twin
         .collect()
 }
 
-/// 1.2 of Coulomb friction and 0.5 of viscous friction.
+/// Returns Coulomb friction of 1.2 plus viscous friction of 0.5.
 fn friction(velocity: f64) -> f64 {
     1.2 * (velocity / 0.03).tanh() + 0.5 * velocity
 }
@@ -86,13 +86,13 @@ fn friction_that_falls_by_a_third_while_the_arm_warms_up_is_no_contact() {
     let warms_up =
         |velocity, time_s: f64| friction(velocity) * (1.0 - 0.33 * (1.0 - (-time_s / 300.0).exp()));
     let onsets = onsets(&run(learnt, &swinging(9, 900, warms_up)));
-    // Five an hour are the wish: in a quarter of one at most two or three by chance.
+    // At the tolerated five false alarms per hour, a quarter of an hour has at most two or three by chance.
     assert!(onsets.len() <= 3, "{onsets:?}");
 }
 
 #[test]
 fn what_does_not_come_back_in_other_recordings_is_not_learnt() {
-    // In each recording something else over the velocity.
+    // Each recording has another dependence on the velocity.
     let all = (1..5).map(|seed| {
         let sign = if seed % 2 == 0 { 1.0 } else { -1.0 };
         swinging(seed, 30, move |velocity, _| sign * friction(velocity))
@@ -108,9 +108,9 @@ fn what_does_not_come_back_in_other_recordings_is_not_learnt() {
     );
 }
 
-/// Lets the twin know an effort, `late` samples late.
+/// Adds an effort to the measurement, and to the twin with a delay of `late` samples.
 fn driven(mut samples: Vec<TwinState>, late: usize) -> Vec<TwinState> {
-    // Steps between rest and 2.5, as of a joint that speeds up and brakes.
+    // Steps between 0 and 2.5, as for a joint that accelerates and brakes.
     let drive = |k: usize| {
         if (k / 100).is_multiple_of(2) {
             2.5
@@ -140,7 +140,7 @@ fn a_twin_that_is_late_where_the_arm_is_driven_does_not_hide_a_push_where_it_is_
     let arm = |seed| driven(swinging(seed, 30, |_, _| 0.0), 2);
     let learnt = learnt((1..5).map(arm));
     let mut samples = arm(9);
-    // The drive changed at 10 s and 11 s, by 2.5, of which the residual was half.
+    // The driving effort changed by 2.5 at 10 s and 11 s, and the residual by half of that.
     for sample in &mut samples[1050..1090] {
         sample.effort[1] -= 0.3;
     }

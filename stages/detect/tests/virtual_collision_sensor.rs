@@ -1,7 +1,7 @@
-//! The virtual collision sensor over a simulated arm of two joints that repeats a cycle: its alarms, the
-//! paper's four remarks, learning on request, and what is kept from one life to the next.
+//! The virtual collision sensor on a simulated arm of two joints that repeats a cycle: its alarms, the
+//! paper's four remarks, learning on request, and the state kept between runs.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use crate::common::Out;
 use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
@@ -14,24 +14,24 @@ use tauscope_detect::{
     Lesson, Lessons, Setup,
 };
 
-/// Samples a second.
+/// Sample rate \[Hz\].
 const RATE: i64 = 500;
-/// The first bias of both joints \[A\].
+/// Initial bias of both joints \[A\].
 const BIAS: f64 = 1.0;
 
 /// The arm's joints.
 const JOINTS: [&str; 2] = ["shoulder", "elbow"];
 
-/// What is different from the model.
+/// Differences between the arm and its model.
 #[derive(Clone, Copy, Default)]
 struct World {
-    /// A payload that the model does not know, as a share of what the model weighs.
+    /// Unmodelled payload, as a share of the model's weight.
     payload: f64,
-    /// A collision of joint 2: from when, for how long \[s\], how hard \[A\].
+    /// A collision of joint 2: start \[s\], duration \[s\], effort \[A\].
     collision: Option<(f64, f64, f64)>,
 }
 
-/// Position, velocity and acceleration of the cycle: a second out, one of rest, a second back, one of rest.
+/// Returns position, velocity and acceleration of the cycle: 1 s out, 1 s of rest, 1 s back, 1 s of rest.
 fn cycle(t: f64) -> (f64, f64, f64) {
     let phase = t.rem_euclid(4.0);
     let (at, sign) = if phase < 2.0 {
@@ -47,7 +47,7 @@ fn cycle(t: f64) -> (f64, f64, f64) {
     (q, sign * v, sign * a)
 }
 
-/// The arm for `seconds`, from `start_s` on.
+/// Returns samples of the arm for `seconds`, from `start_s` on.
 fn arm(start_s: f64, seconds: f64, world: World) -> Vec<TwinState> {
     let mut state = 7_u64;
     let mut noise = move || {
@@ -101,12 +101,12 @@ fn setup() -> Setup {
     }
 }
 
-/// What a sensor has learnt while running.
+/// Returns the state that a sensor has learnt while running.
 fn state(detect: &Detect) -> Learnt {
     serde_json::from_value(detect.learnt().unwrap()).unwrap()
 }
 
-/// The first bias, learnt on these joints.
+/// Returns a learnt state that equals the initial bias, for these joints.
 fn learnt_on<const N: usize>(joints: [&str; N]) -> Learnt {
     let joint = adaptive::LearntJoint {
         ident: BIAS,
@@ -153,7 +153,7 @@ fn run(detect: &mut Detect, samples: &[TwinState]) -> Vec<Detection> {
     out.0
 }
 
-/// Time \[s\] and kind of each alarm.
+/// Returns time \[s\] and kind of each alarm.
 fn alarms(verdicts: &[Detection]) -> Vec<(f64, String)> {
     let onsets = verdicts.iter().filter(|v| v.event() == EventKind::Onset);
     onsets
@@ -164,7 +164,7 @@ fn alarms(verdicts: &[Detection]) -> Vec<(f64, String)> {
 #[test]
 fn a_collision_is_found_within_tens_of_milliseconds_and_the_clean_cycles_are_silent() {
     let hit = World {
-        // In the rest of the third cycle.
+        // During the rest in the third cycle.
         collision: Some((9.5, 0.4, 4.0)),
         ..World::default()
     };
@@ -223,7 +223,7 @@ fn remark_1_a_payload_declared_totally_wrong_is_an_alarm_that_is_no_collision() 
 
 #[test]
 fn remark_2_at_the_start_it_is_not_ready_and_raises_nothing() {
-    // The very first residues are as large as a collision's.
+    // The first residues are as large as in a collision.
     let hit = World {
         collision: Some((0.05, 0.1, 8.0)),
         ..World::default()
@@ -246,14 +246,14 @@ fn remark_3_without_a_request_the_first_bias_stays_for_ever() {
     run(&mut detect, &arm(0.0, 60.0, World::default()));
     for joint in state(&detect).joints.values() {
         assert!((joint.start - BIAS).abs() < f64::EPSILON && joint.adapt_s.is_none());
-        // The estimation runs all the same.
+        // The estimation runs nevertheless.
         assert!(joint.ident > 0.0 && joint.ident < BIAS);
     }
 }
 
 #[test]
 fn remark_4_at_worst_alpha_less_one_is_lost() {
-    // What was learnt is the first bias itself.
+    // The learnt bias equals the initial bias.
     let learnt = learnt_on(JOINTS);
     let samples = arm(0.0, 20.0, World::default());
     let worst = adaptive::Settings {
@@ -263,7 +263,7 @@ fn remark_4_at_worst_alpha_less_one_is_lost() {
     let without = run(&mut detect(&basic()), &samples);
     let with = run(&mut detect(&adaptive_with(worst)), &samples);
     for (without, with) in without.iter().zip(&with) {
-        // Both scores are |R| over the threshold, of which α does not raise the part that is left to noise.
+        // Both scores are |R| over the threshold; α does not scale the threshold's margin for noise.
         assert!(with.score <= without.score + 1e-9);
         assert!(without.score <= 1.1 * with.score + 1e-9);
     }
@@ -271,7 +271,7 @@ fn remark_4_at_worst_alpha_less_one_is_lost() {
 
 #[test]
 fn a_request_reaches_a_running_sensor_and_makes_it_more_sensitive() {
-    // Too weak for the first bias.
+    // Too weak for the initial bias.
     let weak = |at| World {
         collision: Some((at, 0.4, 0.8)),
         ..World::default()
@@ -290,7 +290,7 @@ fn a_request_reaches_a_running_sensor_and_makes_it_more_sensitive() {
     assert_eq!(state_at(23), "free");
     let found = alarms(&verdicts);
     assert!((33.5..33.6).contains(&found[0].0), "{found:?}");
-    // The basic version finds neither and does not listen.
+    // The basic version detects neither and ignores the request.
     let mut without = detect(&basic());
     assert!(alarms(&run(&mut without, &samples)).is_empty());
     assert_eq!(without.learnt(), None);
@@ -381,7 +381,7 @@ fn what_was_learnt_goes_to_the_joint_of_its_name_in_whatever_order_joints_come()
     assert_eq!(state(&stage), learnt);
     let mut hit = arm(0.0, 4.0, World::default());
     for sample in &mut hit[900..950] {
-        // The elbow comes first now, and learnt that 0.25 A more are a collision.
+        // The elbow is first in this cell, and its learnt bias is 0.25 A.
         sample.effort[0] += 0.8;
     }
     let straight = run(&mut detect(&config), &hit);
@@ -442,7 +442,7 @@ fn the_bias_is_learnt_from_what_is_free_of_contact() {
         assert_eq!(full.bias, learnt.bias);
         let joints = full.learnt.as_ref().unwrap().here().unwrap().joints.clone();
         assert!(joints.values().all(|joint| joint.adapt_s == Some(0.0)));
-        // Neither says anything of another run of the same cycle.
+        // Neither raises an alarm in another run of the same cycle.
         for config in [basic_with(learnt.clone()), adaptive_with(full)] {
             let verdicts = run(&mut detect(&config), &arm(40.0, 24.0, World::default()));
             assert!(alarms(&verdicts).is_empty());

@@ -1,8 +1,8 @@
-//! A source that is read by a thread of its own, some samples ahead of whoever takes them.
+//! Reading of a source on its own thread, some samples ahead of the consumer.
 //!
-//! Reading a recording and computing on it take about the same time, so two cores do both in little more than half. What
-//! comes out is the same to the byte: every step of the source is handed on as it was, with its samples and with what
-//! the source had counted by then.
+//! Reading a recording takes about as long as computing on it, so two cores do both in little more than half the
+//! time. The output is identical to the byte: each step of the source is forwarded unchanged, with its samples and
+//! with the source's counts at that step.
 
 use std::io;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -10,36 +10,36 @@ use std::thread::JoinHandle;
 
 use tauscope_bus::{Emit, LinkError, Progress, Sample, Source, StageError};
 
-/// Samples that are handed over at once.
+/// Number of samples in a batch.
 /// Resolution: a thread is woken for each batch; 256 joint states are a quarter of a second at 1 kHz, and 300 kB.
 const BATCH: usize = 256;
-/// Batches on their way, full or empty.
-/// Resolution: memory; one is filled, one is taken, one waits.
+/// Number of batches in circulation, full or empty.
+/// Resolution: memory; one is filled, one is consumed, one waits.
 const BATCHES: usize = 3;
 
-/// Keeps what is emitted.
+/// Buffer of emitted samples.
 #[derive(Debug)]
 struct Kept<T>(Vec<T>);
 
-/// What some steps of a source gave.
+/// Samples and results of consecutive steps of a source.
 struct Batch<T> {
     samples: Kept<T>,
     steps: Vec<Step>,
-    /// Of the last step, if it failed.
+    /// Error of the last step, if it failed.
     failure: Option<StageError>,
 }
 
 /// One step of the source.
 #[derive(Debug, Clone, Copy)]
 struct Step {
-    /// Where in the batch its samples end.
+    /// End of its samples in the batch, exclusive.
     end: usize,
-    /// What it said; `None` if it failed.
+    /// Progress that the step returned; `None` if it failed.
     progress: Option<Progress>,
     standing: Standing,
 }
 
-/// What a source has counted so far.
+/// Counts of a source after a step.
 #[derive(Debug, Clone, Copy)]
 struct Standing {
     dropped: u64,
@@ -73,7 +73,7 @@ impl<T: Sample> Batch<T> {
         }
     }
 
-    /// Takes steps of `source` until it is full; whether more may follow.
+    /// Runs steps of `source` until the batch is full; returns whether more may follow.
     fn fill(&mut self, source: &mut impl Source<T>) -> bool {
         self.samples.0.clear();
         self.steps.clear();
@@ -88,7 +88,7 @@ impl<T: Sample> Batch<T> {
             match progress {
                 Some(Progress::More)
                     if self.samples.0.len() < BATCH && self.steps.len() < BATCH => {}
-                // What waits for a peer is handed on before it waits.
+                // An idle source waits for a peer: forward its samples before that wait.
                 Some(Progress::More | Progress::Idle) => return true,
                 Some(Progress::End) | None => return false,
             }
@@ -96,36 +96,37 @@ impl<T: Sample> Batch<T> {
     }
 }
 
-/// Where batches come from, and where empty ones go back to.
+/// The channel of full batches, and the channel that returns empty ones to the reader.
 type Channels<T> = (Receiver<Batch<T>>, SyncSender<Batch<T>>);
 
-/// A source that is read ahead. Not for a live one: nobody would ask it for its trouble.
+/// A source that is read ahead of its consumer. Not for live sources: [`Source::trouble`] is not forwarded.
 pub struct Ahead<T> {
-    /// Full ones come, empty ones go back. `None` once this ends.
+    /// `None` after the end.
     channels: Option<Channels<T>>,
     batch: Batch<T>,
-    /// Steps and samples of the batch that have been handed on.
+    /// Number of steps of the batch already forwarded.
     stepped: usize,
+    /// Number of samples of the batch already forwarded.
     taken: usize,
     standing: Standing,
     reader: Option<JoinHandle<()>>,
 }
 
 impl<T: Sample> Ahead<T> {
-    /// Begins to read `source`.
+    /// Starts a thread that reads `source`.
     ///
     /// # Errors
-    /// If the system has no thread left.
+    /// If the system cannot start a thread.
     pub fn new(mut source: impl Source<T> + 'static) -> io::Result<Self> {
         let standing = Standing::of(&source);
         let (give, full) = sync_channel(BATCHES);
         let (back, empty) = sync_channel(BATCHES);
         for _ in 1..BATCHES {
-            // It has room for all.
+            // Cannot fail: the channel has capacity for all batches.
             let _ = back.try_send(Batch::new());
         }
         let read = move || {
-            // Without anybody at the other end nobody wants more.
+            // A closed channel means that the consumer is gone.
             while let Ok(mut batch) = empty.recv() {
                 let goes_on = Batch::fill(&mut batch, &mut source);
                 if give.send(batch).is_err() || !goes_on {
@@ -144,7 +145,7 @@ impl<T: Sample> Ahead<T> {
         })
     }
 
-    /// The next batch in the place of the one that is done with.
+    /// Replaces the consumed batch by the next full one.
     fn exchange(&mut self) {
         let Some((full, back)) = &self.channels else {
             return;
@@ -153,12 +154,12 @@ impl<T: Sample> Ahead<T> {
             self.end();
             return;
         };
-        // A reader that has read to the end takes none back.
+        // Fails once the reader has reached the end and exited.
         let _ = back.try_send(std::mem::replace(&mut self.batch, batch));
         (self.stepped, self.taken) = (0, 0);
     }
 
-    /// Waits for the reader, which reads at most one batch more. Its panic goes on here, as if there were one thread.
+    /// Waits for the reader, which reads at most one more batch. Propagates a panic of the reader to this thread.
     fn end(&mut self) {
         self.channels = None;
         if let Some(Err(panic)) = self.reader.take().map(JoinHandle::join)
@@ -207,7 +208,7 @@ impl<T> Drop for Ahead<T> {
     fn drop(&mut self) {
         self.channels = None;
         if let Some(reader) = self.reader.take() {
-            // Whoever ends before the source does has a reason of his own.
+            // A panic of the reader is not propagated: the consumer stopped early, for a reason of its own.
             let _ = reader.join();
         }
     }
@@ -219,7 +220,7 @@ mod tests {
 
     use super::*;
 
-    /// Steps of 0 to 4 samples; the counts move with every step.
+    /// A source with steps of 0 to 4 samples, whose counts change with every step.
     struct Steps {
         step: u64,
         sent: i64,
@@ -260,7 +261,7 @@ mod tests {
         }
     }
 
-    /// What a source gives and says, step by step.
+    /// Samples, result and counts of each step of a source.
     fn all(mut source: impl Source<JointState>) -> Vec<String> {
         let mut told = vec![format!("{} {:?}", source.dropped(), source.fraction_done())];
         loop {

@@ -1,5 +1,4 @@
-//! A twin's efforts and residuals as an archive holds them, so that detectors can be run on what the
-//! twin said then.
+//! Reads a twin's efforts and residuals back from an archive, so that detectors can be run on the recorded twin.
 
 use std::collections::VecDeque;
 use std::path::Path;
@@ -13,24 +12,24 @@ use crate::error::IngestError;
 use crate::recorded::RecordedSource;
 use crate::setup::Setup;
 
-/// A residual may stand this much later in the archive than its joint state \[samples\].
+/// Maximum number of residuals that wait for their joint state.
 /// Resolution: memory; about 0.25 s at 1 kHz.
 const LOOK_AHEAD: usize = 256;
-/// Samples given out in one step.
-/// Resolution: how soon a stop is noticed, against the cost of a step.
+/// Number of samples emitted per step.
+/// Resolution: latency of a stop, against the cost of a step.
 const SAMPLES_PER_STEP: usize = 16;
-/// A longer gap starts the acceleration anew \[ns\].
+/// Longest gap between samples across which the acceleration is differentiated \[ns\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MAX_GAP_NS: i64 = 250_000_000;
 
-/// Where an archive holds the twin's efforts.
+/// Topics of a twin in an archive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ArchivedTwinTopics {
     /// Measured joint states.
     pub state: String,
     /// Expected efforts, not filtered.
     pub twin: String,
-    /// Residuals, from where the twin's filters had settled on.
+    /// Residuals, recorded once the twin's filters have settled.
     pub residual: String,
 }
 
@@ -44,17 +43,17 @@ impl Default for ArchivedTwinTopics {
     }
 }
 
-/// Reads an archive's twin back: joint states, expected efforts and residuals of one stamp each make
-/// one [`TwinState`], `READY` where there is a residual.
+/// Source of the twin states in an archive.
 ///
-/// The archive holds the filtered efforts' difference, not themselves: `filtered_expected_effort` is
-/// the expected effort as it is, and `filtered_effort` that plus the residual.
+/// The joint state, the expected effort and the residual of one stamp make one [`TwinState`], with the flag `READY`
+/// if there is a residual. The archive holds only the difference of the filtered efforts. So
+/// `filtered_expected_effort` is the unfiltered expected effort, and `filtered_effort` is that plus the residual.
 pub struct ArchivedTwin {
     states: RecordedSource,
     residuals: Messages,
     message: ros::JointState,
     joint_names: Vec<String>,
-    /// Residuals by stamp that have not met their state.
+    /// Residuals by stamp whose joint state has not been read yet.
     waiting: VecDeque<(i64, JointArray)>,
     acceleration: Vec<FilteredDerivative>,
     previous_ns: Option<i64>,
@@ -72,10 +71,10 @@ impl std::fmt::Debug for ArchivedTwin {
 }
 
 impl ArchivedTwin {
-    /// Opens the archive at `path`. `config` says how a missing velocity is differentiated.
+    /// Opens the archive at `path`. `config` has the settings for differentiating a missing velocity.
     ///
     /// # Errors
-    /// If it cannot be read, or one of the topics is not there.
+    /// If the archive cannot be read, or lacks one of the topics.
     pub fn open(
         path: &Path,
         topics: &ArchivedTwinTopics,
@@ -107,7 +106,7 @@ impl ArchivedTwin {
         })
     }
 
-    /// The residual of this instant, if the archive has one.
+    /// Returns the residual of this instant, if the archive has one.
     fn residual(&mut self, stamp_ns: i64) -> Result<Option<JointArray>, IngestError> {
         while self
             .waiting
@@ -123,7 +122,7 @@ impl ArchivedTwin {
             .front()
             .is_some_and(|(oldest, _)| *oldest < stamp_ns)
         {
-            // A residual without a joint state: the archive is not one twin's.
+            // A residual without a joint state: the topics are not those of one twin.
             self.waiting.pop_front();
             self.refused += 1;
         }
@@ -137,7 +136,7 @@ impl ArchivedTwin {
         Ok(None)
     }
 
-    /// Reads one more residual; `false` at the end, or if too many wait.
+    /// Reads one more residual; returns `false` at the end, or if too many wait.
     fn read_residual(&mut self) -> Result<bool, IngestError> {
         if self.waiting.len() >= LOOK_AHEAD {
             return Ok(false);

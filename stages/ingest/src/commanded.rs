@@ -1,8 +1,8 @@
-//! Commands on their way into the stream: a source around another that gives each sample the next command, and does
-//! what a command says about the samples from there on.
+//! Commands in the stream of samples: a source that wraps another, attaches the next command to each sample, and
+//! applies its effect from that sample on.
 //!
-//! Live commands come from an inbox (Zenoh), those of an archive with the samples. Both have the same effect here, so a
-//! replay is as the run was.
+//! Live commands come from an inbox (Zenoh), those of an archive come with its samples. Both have the same effect, so
+//! a replay reproduces the run.
 
 mod inbox;
 
@@ -17,16 +17,16 @@ use tauscope_bus::{
 use crate::setup::{Setup, Tool};
 use inbox::Inbox;
 
-/// What commands may ask of a cell.
+/// Limits of the commands that a cell accepts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Takes {
-    /// Whether anything in the cell learns while it runs.
+    /// Whether a detector of the cell learns while it runs.
     pub learn: bool,
-    /// What the arm itself weighs \[kg\], where that is known: it carries no more.
+    /// Mass of the arm \[kg\], if known; a heavier payload is refused.
     pub arm_kg: Option<f64>,
 }
 
-/// A source with commands.
+/// A source that adds commands to the samples of another source.
 pub struct Commanded {
     inner: Box<dyn Source<JointState>>,
     effects: Effects,
@@ -34,7 +34,7 @@ pub struct Commanded {
 }
 
 impl Commanded {
-    /// `inner` with the commands that it brings itself, out of an archive.
+    /// Wraps `inner`, whose samples already carry the commands of an archive.
     pub fn archived(inner: Box<dyn Source<JointState>>) -> Self {
         Self {
             inner,
@@ -43,10 +43,10 @@ impl Commanded {
         }
     }
 
-    /// `inner`, and commands for its cell that come in at `endpoints`, as far as it `takes` them.
+    /// Wraps `inner` and accepts commands for its cell at `endpoints`, within the limits of `takes`.
     ///
     /// # Errors
-    /// If Zenoh does not take an endpoint, or cannot listen there.
+    /// If Zenoh rejects an endpoint, or cannot listen there.
     pub fn live(
         inner: Box<dyn Source<JointState>>,
         setup: &Setup,
@@ -60,18 +60,18 @@ impl Commanded {
     }
 }
 
-/// What commands have changed about all samples from some sample on. Pure.
+/// Effects of the commands so far on all later samples. Pure.
 #[derive(Debug, Default)]
 struct Effects {
     told: Option<Told>,
 }
 
-/// A tool that was told of by a command.
+/// A tool set by a payload command.
 #[derive(Debug, Clone, Copy)]
 struct Told {
-    /// Mass 0 for none.
+    /// The tool; mass 0 for none.
     tool: Tool,
-    /// What the source itself said of the tool then. When it says something else, the command is out of date.
+    /// Tool that the source itself reported then. Once it reports neither this nor `tool`, the command is obsolete.
     instead_of: Tool,
 }
 
@@ -113,7 +113,7 @@ impl Effects {
     }
 }
 
-/// The tool that a sample tells of; all zeros for none.
+/// Returns the tool reported in a sample; all zeros for none.
 fn tool_of(sample: &JointState) -> Tool {
     if !sample.header.has(flags::TOOL) {
         return Tool::default();

@@ -14,7 +14,8 @@ pub use ur_rtde::{UrEffort, UrRtdeConfig};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// A recording: an MCAP file, a rosbag2 folder, an SQLite bag, a bag of ROS 1, or an episode of a LeRobot data set.
+    /// A recording: an MCAP file, a rosbag2 folder, an SQLite bag, a bag of ROS 1, or an episode of a LeRobot data
+    /// set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<FileConfig>,
     /// A table, with or without a header line.
@@ -29,16 +30,17 @@ pub struct Config {
     /// A simulated cell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub simulate: Option<SimulateConfig>,
-    /// Where commands are taken in while the pipeline runs: acknowledge, mute, payload, learn, label. Without it,
-    /// nowhere.
+    /// Zenoh endpoints at which the running pipeline accepts commands: acknowledge, mute, payload, learn, label. By
+    /// default it accepts none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub commands: Option<ZenohEndpoints>,
-    /// How fast recorded or simulated samples are given out. Live messages come when they come.
+    /// Playback rate of recorded or simulated samples. Has no effect on live messages.
     pub rate: Rate,
-    /// Low-pass on positions before they are differentiated, where the source gives no velocity \[Hz\].
+    /// Cutoff of the low-pass filter on positions before they are differentiated, if the source gives no velocity
+    /// \[Hz\].
     #[schemars(range(min = 0.01, max = 10_000.0))]
     pub velocity_cutoff_hz: f64,
-    /// A command, or another twin's effort, that is older than this does not belong to a sample \[s\].
+    /// Maximum age, relative to a sample, of the command or the external twin's effort attached to it \[s\].
     #[schemars(range(min = 0.001, max = 3600.0))]
     pub max_age_s: f64,
 }
@@ -63,10 +65,10 @@ impl Default for Config {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FileConfig {
-    /// The MCAP file, the folder of a rosbag2 bag or its `.db3`, the `.bag` of ROS 1, or `DATASET/episode_000003` of a
-    /// LeRobot data set.
+    /// The MCAP file, the folder of a rosbag2 bag or its `.db3`, the `.bag` of ROS 1, or `DATASET/episode_000003` of
+    /// a LeRobot data set.
     pub path: PathBuf,
-    /// Where in it the messages are.
+    /// Topics of the messages in the recording.
     #[serde(default)]
     pub topics: Topics,
 }
@@ -80,17 +82,18 @@ pub struct Topics {
     /// Commanded positions, perhaps velocities (`sensor_msgs/msg/JointState`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub command: Option<String>,
-    /// Efforts that somebody else's twin computed (`sensor_msgs/msg/JointState`).
+    /// Efforts computed by an external twin (`sensor_msgs/msg/JointState`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub twin: Option<String>,
-    /// The attached tool (`geometry_msgs/msg/InertiaStamped`); mass 0 when it is put down.
+    /// The attached tool (`geometry_msgs/msg/InertiaStamped`); mass 0 when it is detached.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tool: Option<String>,
-    /// Requests that the detectors learn the robot's usual behaviour anew (`std_msgs/msg/Bool`, true).
+    /// Requests that the detectors relearn the robot's baseline behaviour (`std_msgs/msg/Bool`, true).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learn: Option<String>,
-    /// Commands of an archive of tauscope (`diagnostic_msgs/msg/DiagnosticArray`), so that they hold in a replay as they
-    /// did live. Where a recording does not have the topic, nothing was told. Live commands come another way.
+    /// Commands in an archive of tauscope (`diagnostic_msgs/msg/DiagnosticArray`), so that a replay applies them as
+    /// the live run did. A recording may lack the topic. Live commands arrive at the source's `commands` endpoints
+    /// instead.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub commands: Option<String>,
 }
@@ -108,26 +111,26 @@ impl Default for Topics {
     }
 }
 
-/// A table: one row an instant.
+/// A table with one row per instant.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CsvConfig {
     /// The file.
     pub path: PathBuf,
-    /// Which column is what.
+    /// Mapping of the columns to quantities.
     pub columns: tauscope_archive::CsvMapping,
 }
 
-/// Live messages over Zenoh. At least one of `connect` and `listen` must be given: nothing is found
-/// by multicast, so that two cells on one network cannot meet by accident.
+/// Live messages over Zenoh. At least one of `connect` and `listen` must be given: multicast discovery
+/// is off, so that two cells on one network cannot connect by accident.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ZenohConfig {
-    /// Endpoints to connect to, e.g. `tcp/localhost:7447`; tried again until they answer.
+    /// Endpoints to connect to, e.g. `tcp/localhost:7447`; retried until they answer.
     pub connect: Vec<String>,
     /// Endpoints to listen on.
     pub listen: Vec<String>,
-    /// Who publishes, and so what the keys look like.
+    /// Key scheme of the publishers.
     pub keys: Keys,
     /// `ROS_DOMAIN_ID` of the publishers, for `rmw_zenoh`.
     #[schemars(range(max = 232))]
@@ -138,7 +141,7 @@ pub struct ZenohConfig {
     pub namespace: Option<String>,
     /// The topics.
     pub topics: Topics,
-    /// Messages held while the pipeline is busy; the oldest gives way, and is counted.
+    /// Capacity of the queue of received messages. When it is full, the oldest message is dropped and counted.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub queue: usize,
 }
@@ -157,7 +160,7 @@ impl Default for ZenohConfig {
     }
 }
 
-/// Key expressions of a publisher on Zenoh.
+/// Key schemes of publishers on Zenoh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Keys {
@@ -166,7 +169,7 @@ pub enum Keys {
     RmwZenoh,
     /// ROS 2 nodes behind `zenoh-bridge-ros2dds`: `<namespace>/<topic>`.
     Ros2dds,
-    /// tauscope's own: `<cell>/<topic>`.
+    /// Publishers of tauscope itself: `<cell>/<topic>`.
     Tauscope,
 }
 
@@ -176,25 +179,25 @@ pub enum Keys {
 pub struct SimulateConfig {
     /// The scenario file, as `tauscope simulate` takes it.
     pub scenario: PathBuf,
-    /// Which of its recordings is played; by default the first.
+    /// Name of the recording to play; by default the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<String>,
 }
 
-/// How fast recorded samples are given out: `realtime`, `fast`, or a factor such as 2.5.
+/// Playback rate of recorded samples: `realtime`, `fast`, or a factor such as 2.5.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Rate {
-    /// As fast as they were recorded.
+    /// The recorded rate.
     #[default]
     Realtime,
     /// As fast as the machine can.
     Fast,
-    /// This many times as fast as they were recorded.
+    /// This multiple of the recorded rate.
     Factor(f64),
 }
 
 impl Rate {
-    /// Seconds of recording per second of time; `None` for as fast as possible.
+    /// Returns the seconds of recording per second of real time; `None` for as fast as possible.
     pub fn factor(self) -> Option<f64> {
         match self {
             Self::Realtime => Some(1.0),
@@ -258,53 +261,53 @@ impl JsonSchema for Rate {
     }
 }
 
-/// What is wrong with a source's configuration.
+/// Errors in the configuration of a source.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ConfigError {
-    /// Not exactly one source.
+    /// A number of sources other than one.
     #[error(
         "an ingest stage has exactly one of `file`, `csv`, `zenoh`, `ur_rtde` and `simulate`, found {found}"
     )]
     OneSource {
-        /// How many were given.
+        /// Number of sources given.
         found: usize,
     },
-    /// A Zenoh source that nothing can reach.
+    /// A Zenoh source without endpoints.
     #[error("`zenoh` needs at least one endpoint in `connect` or `listen`")]
     NoEndpoint,
-    /// Not the six joints of an arm of Universal Robots.
+    /// A number of joints other than the six of a Universal Robots arm.
     #[error(
         "`ur_rtde` reads six joints, found {found}: name them from base to wrist, `joints: [shoulder_pan_joint, ...]`"
     )]
     UrJoints {
-        /// How many there are.
+        /// Number of joints.
         found: usize,
     },
-    /// A joint of the cell that the controller does not know.
+    /// A joint of the cell that `joints` of `ur_rtde` does not name.
     #[error("`joints` of `ur_rtde` does not name joint `{joint}` of the robot")]
     UrJointUnnamed {
         /// The joint.
         joint: String,
     },
-    /// A payload, and no link to attach it to.
+    /// A payload without a link to attach it to.
     #[error("`payload: true` needs a `tool` of the cell with the `link` that is the flange")]
     UrPayload,
-    /// Zenoh does not take an endpoint or a key.
+    /// An endpoint or key that Zenoh rejects.
     #[error("zenoh does not take {what} `{text}`: {reason}")]
     Zenoh {
         /// Endpoint or key.
         what: &'static str,
-        /// The text.
+        /// Text of the endpoint or key.
         text: String,
-        /// What Zenoh says.
+        /// Reason given by Zenoh.
         reason: String,
     },
-    /// More joints than a sample has room for.
+    /// More joints than a sample holds.
     #[error("{found} joints, at most {limit} are supported")]
     TooManyJoints {
-        /// How many there are.
+        /// Number of joints.
         found: usize,
-        /// How many fit.
+        /// Maximum number of joints.
         limit: usize,
     },
 }

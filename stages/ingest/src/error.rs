@@ -1,4 +1,4 @@
-//! Why a source cannot be opened, or not be read on.
+//! Errors of opening and reading a source.
 
 use tauscope_archive::ArchiveError;
 use tauscope_session::{SessionError, Unusable};
@@ -6,39 +6,39 @@ use tauscope_session::{SessionError, Unusable};
 use crate::config::ConfigError;
 use crate::simulated::ScenarioError;
 
-/// Why a source cannot be opened, or not be read on.
+/// Errors of opening and reading a source.
 #[derive(Debug, thiserror::Error)]
 pub enum IngestError {
-    /// The configuration makes no sense.
+    /// An invalid configuration.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The recording cannot be read.
+    /// A recording that cannot be read.
     #[error(transparent)]
     Archive(#[from] ArchiveError),
-    /// The recording can be read, but holds no sample of this cell.
+    /// A readable recording without a sample of this cell.
     #[error("{origin}: {source}")]
     Pack {
-        /// Where the messages came from.
+        /// Origin of the messages.
         origin: String,
-        /// What is wrong with them.
+        /// Reason why they cannot be used.
         source: Unusable,
     },
-    /// The recording gives no joint states of this cell.
+    /// A recording without joint states of this cell.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The scenario cannot be simulated.
+    /// A scenario that cannot be simulated.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// The system has no thread left.
+    /// A thread that the system cannot start.
     #[error("no thread for the source: {0}")]
     Thread(std::io::Error),
-    /// Zenoh cannot be reached, or not be used.
+    /// An error of Zenoh.
     #[error("zenoh: {0}")]
     Zenoh(String),
 }
 
 impl IngestError {
-    /// Whether the arguments or files are wrong (exit code 2), rather than what happened since
+    /// Returns whether the arguments or files are at fault (exit code 2) rather than a later event
     /// (exit code 1).
     pub fn is_input(&self) -> bool {
         !matches!(

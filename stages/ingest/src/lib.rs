@@ -1,10 +1,9 @@
-//! Where samples come from: recordings, live ROS 2 over Zenoh, Universal Robots controllers, the simulated
+//! Sources of samples: recordings, live ROS 2 over Zenoh, Universal Robots controllers, the simulated
 //! cell.
 //!
-//! Whatever the source, its messages go through the same packing: joints are brought into the cell's
-//! order by name, and each sample takes with it what belongs to its instant. That part is pure; the
-//! sources around it do the input, and [`Paced`] holds recorded and simulated samples back until
-//! their time has come.
+//! The messages of all sources go through the same packing. It brings the joints into the cell's order
+//! by name, and attaches to each sample the command, tool and external effort of its instant. Packing is
+//! pure; the sources do the input, and [`Paced`] delays recorded and simulated samples until they are due.
 //!
 //! The simulated cell needs no robot:
 //!

@@ -1,7 +1,6 @@
-//! Gives recorded or simulated samples out at the rate they were taken at, or a multiple of it.
+//! Emits recorded or simulated samples at the rate of their stamps, or at a multiple of it.
 //!
-//! The only clock of the house that samples are held against; it stands around the source, so that
-//! what is inside needs none.
+//! Only [`Paced`] delays samples by a clock. It wraps a source, so that the source itself needs none.
 
 use std::collections::VecDeque;
 use std::num::NonZeroU64;
@@ -10,33 +9,33 @@ use std::time::{Duration, Instant};
 use rustix::thread::set_current_timer_slack;
 use tauscope_bus::{Emit, LinkError, Progress, Sample, Source, StageError, flags};
 
-/// A step returns within a tenth of a second.
-/// Resolution: how soon a stop is noticed, against how often the stage wakes up.
+/// Longest sleep of a step, so that it returns within a tenth of a second.
+/// Resolution: latency of a stop, against the number of wake-ups.
 const LONGEST_SLEEP: Duration = Duration::from_millis(50);
-/// How much later than due the system may wake a thread that paces \[ns\]: one interrupt of its timer then wakes many.
+/// Timer slack of a pacing thread \[ns\], so that one timer interrupt wakes many threads.
 /// Resolution: half a sample at 1 kHz. 150 cells need two interrupts a millisecond instead of 150.
 const SLACK_NS: u64 = 500_000;
-/// A pause in the stamps that is longer is not waited for.
+/// Longest gap in the stamps that is waited out \[ns\]; a longer one is skipped.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LONGEST_PAUSE_NS: i64 = 60_000_000_000;
 
-/// A source whose samples come out in time with their stamps.
+/// A source that emits the samples of another in step with their stamps.
 #[derive(Debug)]
 pub struct Paced<S, T> {
     inner: S,
-    /// Seconds of stamps per second of time.
+    /// Seconds of stamps per second of real time.
     factor: f64,
-    /// A moment, and the stamp that was due then.
+    /// A reference instant, and the stamp that was due then.
     anchor: Option<(Instant, i64)>,
     newest_ns: i64,
     held: VecDeque<T>,
     ended: bool,
-    /// The thread in which it runs is woken with [`SLACK_NS`].
+    /// Whether the timer slack of its thread has been set to [`SLACK_NS`].
     slack: bool,
 }
 
 impl<S, T> Paced<S, T> {
-    /// `inner` at `factor` times the rate of its stamps; `factor` is above zero.
+    /// Plays `inner` at `factor` times the rate of its stamps; `factor` is above zero.
     pub fn new(inner: S, factor: f64) -> Self {
         Self {
             inner,
@@ -49,7 +48,7 @@ impl<S, T> Paced<S, T> {
         }
     }
 
-    /// When the sample with this stamp is due.
+    /// Returns the instant at which the sample with this stamp is due.
     fn due(&mut self, stamp_ns: i64, reset: bool) -> Instant {
         let pause_ns = stamp_ns - self.newest_ns;
         if let Some((moment, at_ns)) = self.anchor
@@ -80,7 +79,7 @@ impl<T: Sample> Emit<T> for Hold<'_, T> {
 impl<T: Sample, S: Source<T>> Source<T> for Paced<S, T> {
     fn step(&mut self, out: &mut dyn Emit<T>) -> Result<Progress, StageError> {
         if !std::mem::replace(&mut self.slack, true) {
-            // A system that does not know it wakes each thread by itself.
+            // Failure is harmless: without slack, the system wakes each thread separately.
             let _ = set_current_timer_slack(NonZeroU64::new(SLACK_NS));
         }
         if self.held.is_empty() {

@@ -1,8 +1,8 @@
-//! Packing: from messages of several topics to one sample an instant. Pure: no clock, no I/O.
+//! Packing of messages from several topics into one sample per instant. Pure: no clock, no I/O.
 //!
-//! An [`Assembler`] makes states of all joints from the messages. A missing velocity is differentiated, and each sample
-//! takes with it the newest command, the newest effort of another twin and the tool, at or before its stamp. A sample
-//! waits a little for these, so that the result does not depend on which of two messages was faster.
+//! An [`Assembler`] combines the messages into states of all joints. A missing velocity is differentiated. Each
+//! sample receives the newest command, the newest effort of another twin and the tool, at or before its stamp. A
+//! sample waits briefly for these, so that the result does not depend on the order of arrival.
 
 mod differentiate;
 mod refused;
@@ -23,7 +23,7 @@ use refused::Reported;
 pub use settings::PackSettings;
 use side::Side;
 
-/// Samples that wait for their command at most.
+/// Maximum number of samples that wait for their command.
 /// Resolution: memory; about 1 s at 1 kHz.
 const MAX_PENDING: usize = 1024;
 
@@ -33,11 +33,11 @@ pub struct Packer {
     settings: PackSettings,
     joint_count: usize,
     assembler: Assembler,
-    /// Of the side topics.
+    /// Joint layouts of the messages on the side topics.
     layouts: Layouts,
     command: Gather,
     reference: Gather,
-    /// Whole turns that the driver has taken off, of measured and of commanded positions.
+    /// Unwrapping of the full turns that the driver removed, of measured and of commanded positions.
     turns: [[Unwrap; MAX_JOINTS]; 2],
     state_velocity: Differentiator,
     command_velocity: Differentiator,
@@ -45,14 +45,14 @@ pub struct Packer {
     references: Side<JointArray>,
     tools: Side<Option<Tool>>,
     fixed_tool: Option<Tool>,
-    /// Somebody has asked for learning since the newest sample.
+    /// Whether learning was requested since the newest sample.
     learning_asked: bool,
-    /// Commands of a recording that no sample has taken yet.
+    /// Commands of a recording that wait for a sample.
     told: VecDeque<tauscope_bus::Command>,
     pending: VecDeque<JointState>,
     flushed: bool,
     packed: u64,
-    /// Of the side topics.
+    /// Counts of the side topics.
     side_counts: Counts,
     reported: Reported,
 }
@@ -71,7 +71,7 @@ struct Command {
 }
 
 impl Packer {
-    /// A packer for a cell whose source is live.
+    /// Creates a packer for a cell whose source is live.
     ///
     /// # Errors
     /// If there are more joints than a sample holds.
@@ -79,7 +79,7 @@ impl Packer {
         Self::with(setup, settings, Assembler::live)
     }
 
-    /// A packer whose states are assembled by what `assembler` makes of the joints' names.
+    /// Creates a packer whose assembler is made from the joints' names by `assembler`.
     ///
     /// # Errors
     /// If there are more joints than a sample holds.
@@ -120,7 +120,7 @@ impl Packer {
         })
     }
 
-    /// What it has counted.
+    /// Returns the counts of packed and refused messages.
     pub fn counts(&self) -> Counts {
         let (states, sides) = (self.assembler.counts(), self.side_counts);
         Counts {
@@ -133,7 +133,7 @@ impl Packer {
         }
     }
 
-    /// Which of the cell's joints a message names: bit j is joint j.
+    /// Returns the joints of the cell that a message names: bit j is joint j.
     pub(crate) fn joints_of(&mut self, message: &ros::JointState) -> u32 {
         self.assembler.joints_of(message)
     }
@@ -143,7 +143,7 @@ impl Packer {
         self.assembler.undecodable(reason);
     }
 
-    /// Findings about the messages so far.
+    /// Returns the findings about the messages so far.
     pub fn findings(&self) -> Vec<Finding> {
         let sides = [
             (&self.command, "of the commands"),
@@ -231,21 +231,20 @@ impl Packer {
             .push(stamp_ns, (tool.mass_kg > 0.0).then_some(tool));
     }
 
-    /// Takes a request that the detectors learn anew: it belongs to the state that comes next, for it
-    /// has no stamp of its own.
+    /// Takes a request that the detectors relearn. It has no stamp of its own, so the next state carries it.
     pub fn learn(&mut self, message: ros::Bool) {
         self.learning_asked |= message.data;
     }
 
-    /// Takes a command of a recording: it belongs to the state that comes next.
+    /// Takes a command of a recording. The next state carries it.
     pub fn told(&mut self, command: tauscope_bus::Command) {
         if self.told.len() < MAX_PENDING {
             self.told.push_back(command);
         }
     }
 
-    /// Gives out the next sample that need not wait any longer; `now_ns` is the present on the clock
-    /// of reception (the time of the newest message, where nothing is live).
+    /// Returns the next sample that is due. `now_ns` is the current time on the clock of reception (for a
+    /// recording, the time of the newest message).
     pub fn pop(&mut self, now_ns: i64) -> Option<JointState> {
         self.is_due(now_ns).then(|| {
             let mut sample = JointState::default();
@@ -254,20 +253,20 @@ impl Packer {
         })
     }
 
-    /// Whether [`Packer::pop`] has one.
+    /// Whether [`Packer::pop`] returns a sample.
     pub fn is_due(&self, now_ns: i64) -> bool {
         self.pending.front().is_some_and(|front| {
             let stamp_ns = front.header.stamp_ns;
             let complete = (!self.settings.expects_command || self.commands.reaches(stamp_ns))
                 && (!self.settings.expects_reference || self.references.reaches(stamp_ns));
-            // A clock of reception that was set back does not make it wait for ever.
+            // Absolute: a clock of reception that is set back must not block the sample for ever.
             let waited_ns = now_ns.saturating_sub(front.header.received_ns);
             let waited = waited_ns.saturating_abs() >= self.settings.wait_ns;
             complete || waited || self.flushed || self.pending.len() >= MAX_PENDING
         })
     }
 
-    /// Gives out the sample that is due, in its place.
+    /// Writes the sample that is due into `sample`.
     pub fn pop_into(&mut self, sample: &mut JointState) {
         if let Some(front) = self.pending.front() {
             *sample = *front;
@@ -282,12 +281,12 @@ impl Packer {
         !self.pending.is_empty()
     }
 
-    /// No message will follow: nothing waits any longer.
+    /// Ends the input: no sample waits any longer.
     pub fn flush(&mut self) {
         self.flushed = true;
     }
 
-    /// Adds a message of a side topic to what it brought; gives the state of all joints once it is whole.
+    /// Adds a message of a side topic to its partial state; returns the state once it has all joints.
     fn gather(
         &mut self,
         topic: Topic,
@@ -316,7 +315,7 @@ impl Packer {
         Some(whole)
     }
 
-    /// Positions without the wraps of the driver.
+    /// Returns the positions without the driver's wrapping.
     fn unwrapped(&mut self, is_command: bool, whole: &Whole) -> JointArray {
         let mut position = whole.position;
         let turns = &mut self.turns[usize::from(is_command)];
@@ -326,7 +325,7 @@ impl Packer {
         position
     }
 
-    /// Puts a whole state among the samples that wait.
+    /// Appends a state of all joints to the samples that wait.
     fn sample(&mut self, whole: &Whole, flags: u32, received_ns: i64) {
         let mut flags = flags
             + flags::EFFORT_MEASURED * u32::from(whole.has_effort)
@@ -359,7 +358,7 @@ impl Packer {
         });
     }
 
-    /// Adds what belongs to the sample's instant.
+    /// Attaches the command, the other twin's effort and the tool of the sample's instant.
     fn attach(&mut self, sample: &mut JointState) {
         let stamp_ns = sample.header.stamp_ns;
         if sample.header.has(flags::RESET) {
@@ -380,7 +379,7 @@ impl Packer {
             sample.reference_effort = *effort;
             sample.header.flags |= flags::REFERENCE;
         }
-        // A tool stays until another is told of, however long that takes.
+        // A tool does not age: it stays attached until another one is reported.
         let tool = match self.tools.at(stamp_ns, i64::MAX) {
             Some(told) => *told,
             None => self.fixed_tool,

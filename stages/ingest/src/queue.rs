@@ -1,10 +1,10 @@
-//! Messages that wait for the pipeline, at most so many: the oldest gives way.
+//! Bounded queue of received messages. When it is full, the oldest message is dropped.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// The queue between the threads that receive and the stage's.
+/// The queue between the receiving threads and the thread of the stage.
 #[derive(Debug)]
 pub(crate) struct Queue<T> {
     state: Mutex<State<T>>,
@@ -30,7 +30,7 @@ impl<T> Queue<T> {
         }
     }
 
-    /// Adds a message and never waits.
+    /// Adds a message without blocking.
     pub fn push(&self, message: T) {
         let mut state = self.lock();
         if state.messages.len() >= self.capacity {
@@ -42,7 +42,7 @@ impl<T> Queue<T> {
         self.filled.notify_one();
     }
 
-    /// Takes the oldest message, waiting at most `patience` for one.
+    /// Removes the oldest message; waits at most `patience` for one.
     pub fn pop(&self, patience: Duration) -> Option<T> {
         let state = self.lock();
         let empty = |state: &mut State<T>| state.messages.is_empty();
@@ -53,12 +53,12 @@ impl<T> Queue<T> {
         state.messages.pop_front()
     }
 
-    /// Messages that gave way.
+    /// Returns the number of dropped messages.
     pub fn overflowed(&self) -> u64 {
         self.lock().overflowed
     }
 
-    /// Nothing in here can be left half done, so a panic elsewhere does not matter.
+    /// Locks the queue, even if poisoned: no operation on it can be left half done.
     fn lock(&self) -> MutexGuard<'_, State<T>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }

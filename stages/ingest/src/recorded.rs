@@ -1,4 +1,4 @@
-//! Joint states out of a recording: MCAP, a rosbag2 bag, a bag of ROS 1, a table, or an episode of a LeRobot data set.
+//! Joint states from a recording: MCAP, a rosbag2 bag, a bag of ROS 1, a table, or an episode of a LeRobot data set.
 
 use std::path::{Path, PathBuf};
 
@@ -13,17 +13,17 @@ use crate::findings::Findings;
 use crate::pack::{PackSettings, Packer};
 use crate::setup::Setup;
 
-/// How much later in the recording a command of a sample's instant may stand \[ns of log time\].
+/// Longest wait of a sample for the command of its instant \[ns of log time\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const WAIT_NS: i64 = 100_000_000;
-/// Messages that are read in one step.
-/// Resolution: how soon a stop is noticed, against the cost of a step.
+/// Maximum number of messages read per step.
+/// Resolution: latency of a stop, against the cost of a step.
 const MESSAGES_PER_STEP: usize = 512;
-/// Samples that are given out in one step.
-/// Resolution: how soon a stop is noticed, against the cost of a step.
+/// Number of samples emitted per step.
+/// Resolution: latency of a stop, against the cost of a step.
 const SAMPLES_PER_STEP: usize = 16;
 
-/// Which part of a sample a topic brings.
+/// Part of a sample that a topic supplies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Role {
     State,
@@ -34,12 +34,12 @@ enum Role {
     Told,
 }
 
-/// A source that reads a recording, once, from its beginning to its end. Memory is bounded whatever
-/// the recording's size.
+/// A source that reads a recording once from beginning to end, in memory that does not grow with its
+/// size.
 pub struct RecordedSource {
     path: PathBuf,
     messages: Messages,
-    /// By the topic's place in the recording.
+    /// Role of each topic, by its index in the recording.
     roles: Vec<Option<Role>>,
     packer: Packer,
     first: Option<JointState>,
@@ -52,7 +52,7 @@ pub struct RecordedSource {
     now_ns: i64,
     ended: bool,
     findings: Findings,
-    /// Whether somebody else reports the findings.
+    /// Whether the findings are reported elsewhere, so that they need not be logged.
     reported_elsewhere: bool,
     damage: Vec<Damage>,
     undecodable: u64,
@@ -68,11 +68,11 @@ impl std::fmt::Debug for RecordedSource {
 }
 
 impl RecordedSource {
-    /// Opens the recording that `file` names, and reads on to its first sample.
+    /// Opens the recording that `file` names, and reads up to its first sample.
     ///
     /// # Errors
-    /// If it cannot be read, a topic is not there, or it holds no sample of this cell: no message
-    /// names a joint, a joint is NaN throughout.
+    /// If it cannot be read, a topic is missing, or it holds no sample of this cell: no message
+    /// names a joint, or a joint is NaN throughout.
     pub fn open_file(
         file: &FileConfig,
         config: &Config,
@@ -82,7 +82,7 @@ impl RecordedSource {
         Self::open(&recording, (&file.topics, config), setup, Look::assembler)
     }
 
-    /// As [`RecordedSource::open_file`], for who learns from the samples: what follows a jump back of the stamps is refused.
+    /// Like [`RecordedSource::open_file`], for learning: samples after a backward jump of the stamps are refused.
     ///
     /// # Errors
     /// As [`RecordedSource::open_file`].
@@ -96,10 +96,10 @@ impl RecordedSource {
         Self::open(&recording, (&file.topics, config), setup, assembler)
     }
 
-    /// Opens the table that `csv` names, and reads on to its first sample.
+    /// Opens the table that `csv` names, and reads up to its first sample.
     ///
     /// # Errors
-    /// As [`RecordedSource::open_file`]; an error in the table comes with its line.
+    /// As [`RecordedSource::open_file`]; an error in the table is reported with its line.
     pub fn open_csv(csv: &CsvConfig, config: &Config, setup: &Setup) -> Result<Self, IngestError> {
         let recording = tauscope_session::open_table(&csv.path, &csv.columns, &setup.joint_names)?;
         let topics = Topics::default();
@@ -152,7 +152,7 @@ impl RecordedSource {
         for damage in &source.damage {
             tracing::warn!("{damage}");
         }
-        // What is wrong with the whole recording shows before anything is started.
+        // Read up to the first sample, so that faults of the whole recording are reported before any stage starts.
         while source.first.is_none() {
             source.first = source.next_sample(usize::MAX)?;
             if source.ended && source.first.is_none() {
@@ -165,33 +165,33 @@ impl RecordedSource {
         Ok(source)
     }
 
-    /// Where it reads.
+    /// Returns the path of the recording.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// A handle to the findings, for who reports them. Without it they are logged at the end.
+    /// Returns a handle to the findings; the caller reports them. Without this call they are logged at the end.
     pub fn findings(&mut self) -> Findings {
         self.reported_elsewhere = true;
         self.findings.clone()
     }
 
-    /// What it has counted.
+    /// Returns the counts of packed and refused messages.
     pub fn counts(&self) -> Counts {
         self.packer.counts()
     }
 
-    /// Parts of the recording that could not be read so far.
+    /// Returns the parts of the recording that could not be read so far.
     pub fn damage(&self) -> &[Damage] {
         &self.damage
     }
 
-    /// Messages that were not what their topic says, so far.
+    /// Returns the number of messages so far that cannot be decoded as their topic's type.
     pub fn undecodable(&self) -> u64 {
         self.undecodable
     }
 
-    /// The next sample, `None` at the end.
+    /// Returns the next sample; `None` at the end.
     ///
     /// # Errors
     /// If the recording cannot be read any further.
@@ -207,7 +207,7 @@ impl RecordedSource {
         Ok(self.packer.pop(self.now_ns))
     }
 
-    /// Reads at most `limit` messages on to the next sample; whether there is one.
+    /// Reads at most `limit` messages until a sample is due; returns whether one is.
     fn read_on(&mut self, limit: usize) -> Result<bool, IngestError> {
         let mut read = 0;
         loop {
@@ -271,7 +271,7 @@ impl RecordedSource {
         Ok(())
     }
 
-    /// Logs the findings, once all has been read.
+    /// Logs the findings once, after the last message, unless they are reported elsewhere.
     fn log_findings(&mut self) {
         if !std::mem::replace(&mut self.reported_elsewhere, true) {
             for finding in self.findings.get() {
@@ -280,7 +280,7 @@ impl RecordedSource {
         }
     }
 
-    /// The commands of a message of an archive. What is none of ours is told of and left alone.
+    /// Takes the commands in a message of an archive. Entries that are not commands are logged and skipped.
     fn take_told(&mut self) {
         for status in &self.told.status {
             let argument = |name: &str| {
@@ -295,7 +295,7 @@ impl RecordedSource {
     }
 }
 
-/// The role of each of the recording's topics, and the names of those to read.
+/// Returns the role of each topic of the recording, and the names of the topics to read.
 fn roles<'a>(
     recording: &Recording,
     topics: &'a Topics,
@@ -310,7 +310,7 @@ fn roles<'a>(
     ] {
         wanted.extend(topic.as_deref().map(|name| (name, role)));
     }
-    // Where nobody asked for learning or told anything, nobody wrote it down. Another's topic may have the name.
+    // A recording without requests lacks their topics, and a foreign topic may have the name of the commands' topic.
     let is_there = |name: &str| recording.topics().iter().any(|topic| topic.name == name);
     wanted.retain(|(name, role)| match role {
         Role::Learn => is_there(name),

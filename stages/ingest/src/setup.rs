@@ -1,17 +1,17 @@
-//! What a source must know of its cell.
+//! Facts of a cell that its source needs.
 
-/// The facts of a cell that a source needs; the program works them out.
+/// Facts of a cell that its source needs; the program determines them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Setup {
     /// The cell's name: the prefix of tauscope's own Zenoh keys.
     pub cell: String,
     /// The joints, in URDF order.
     pub joint_names: Vec<String>,
-    /// By joint, the effort limit of the robot file \[N m or N\]; empty where there is no robot file.
+    /// Effort limit of each joint in the robot file \[N m or N\]; empty without a robot file.
     pub effort_limits: Vec<Option<f64>>,
-    /// The tool that is attached, as far as no topic says otherwise.
+    /// The attached tool, unless a topic reports another one.
     pub tool: Option<Tool>,
-    /// Whether it is known which link carries a tool.
+    /// Whether the link that carries tools is known.
     pub has_tool_link: bool,
 }
 

@@ -1,9 +1,9 @@
-//! The simulated cell: an arm with physics that its URDF does not tell of, driven along given motions,
-//! pushed now and then, and measured by imperfect sensors.
+//! The simulated cell: an arm with physics beyond its URDF, driven along given motions, pushed at
+//! times, and measured by imperfect sensors.
 //!
-//! Effort is the motor's: what the rigid body needs, plus what friction and the like cost, less what
-//! a push does for it (measured - RNEA = friction - Jᵀ F, with F the force on the robot). The same
-//! scenario gives the same numbers every time. Positions and velocities are those of the motors.
+//! The effort is that of the motors: rigid-body effort plus friction and similar losses, minus the
+//! effort of a push (measured - RNEA = friction - Jᵀ F, with F the force on the robot). Positions and
+//! velocities are those of the motors. A scenario is deterministic: it gives the same numbers every time.
 
 mod check;
 mod conceal;

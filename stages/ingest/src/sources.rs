@@ -1,5 +1,5 @@
-//! The table of sources. Adding one is its file, its key in [`Config`] and one line here: who opens sources,
-//! looks for their files or says how many are given goes through this table.
+//! Table of the sources. A new source needs its file, its key in [`Config`] and one line here: all code that opens
+//! sources, finds their files or counts them uses this table.
 
 use std::path::PathBuf;
 
@@ -17,7 +17,7 @@ use crate::simulated::{Scenario, ScenarioError, SimulatedCell};
 use crate::ur_rtde::UrRtdeSource;
 use crate::zenoh::ZenohSource;
 
-/// The entry of the source with this key, which is that of its field in [`Config`].
+/// Makes the entry of a source from its key, which is the name of its field in [`Config`].
 macro_rules! entry {
     ($name:ident) => {
         Entry {
@@ -41,68 +41,69 @@ pub static SOURCES: &[Entry] = &[
     entry!(simulate),
 ];
 
-/// What the table says of a source.
+/// Entry of a source in the table.
 #[derive(Debug)]
 pub struct Entry {
     /// Its key in a pipeline file.
     pub name: &'static str,
-    /// Its settings, where they are given.
+    /// Returns its settings, if given.
     pub given: fn(&Config) -> Option<&dyn SourceSettings>,
-    /// The same, to be changed.
+    /// Returns its settings for modification, if given.
     pub given_mut: fn(&mut Config) -> Option<&mut dyn SourceSettings>,
 }
 
-/// Settings of a source, and all that is known of it before it runs.
+/// Settings of a source, and its properties that are known before it runs.
 pub trait SourceSettings {
-    /// Opens it.
+    /// Opens the source.
     ///
     /// # Errors
-    /// If it cannot be opened; [`IngestError::is_input`] tells whose fault that is.
+    /// If it cannot be opened; [`IngestError::is_input`] distinguishes faults of the input from others.
     fn open(&self, cell: &Opening<'_>) -> Result<Box<dyn Source<JointState>>, IngestError>;
 
-    /// The setting that names the file it reads, and what that file is; `None` for a live source.
+    /// Returns the setting that names the file it reads, and the kind of file; `None` for a live source.
     fn file(&self) -> Option<(&'static str, &'static str)> {
         None
     }
 
-    /// The path of that file.
+    /// Returns the path of that file.
     fn path_mut(&mut self) -> Option<&mut PathBuf> {
         None
     }
 
-    /// The topics that it reads, if it reads any.
+    /// Returns the topics that it reads, if any.
     fn topics(&self) -> Option<&Topics> {
         None
     }
 
-    /// What would help where another twin's effort is wanted and it gives none; `None` if it gives one, or has topics.
+    /// Returns the remedy if an external twin's effort is required and the source gives none; `None` if it gives one,
+    /// or has topics.
     fn without_twin(&self) -> Option<&'static str> {
         None
     }
 
-    /// The setting by which its efforts are motor currents in A, where it is known.
+    /// Returns the setting that makes its efforts motor currents in A, if there is one.
     fn gives_amperes(&self) -> Option<&'static str> {
         None
     }
 
-    /// Why it can never give a sample, and what would help.
+    /// Returns the reason why it can never give a sample, and the remedy.
     fn fault(&self) -> Option<(&'static str, &'static str)> {
         None
     }
 }
 
-/// What a source is opened with.
+/// Arguments for opening a source.
 #[derive(Debug, Clone, Copy)]
 pub struct Opening<'a> {
-    /// What all sources share.
+    /// Settings shared by all sources.
     pub config: &'a Config,
     /// The cell.
     pub setup: &'a Setup,
-    /// The simulated robot, for who simulates one.
+    /// The simulated robot, for `simulate` only.
     pub robot: Option<&'a SimulatedRobot>,
 }
 
-/// What a simulated cell needs besides its configuration; the program loads both files.
+/// Scenario and robot of a simulated cell; the program loads both files.
 #[derive(Debug, Clone)]
 pub struct SimulatedRobot {
     /// The scenario, its paths resolved.
@@ -203,7 +204,7 @@ impl SourceSettings for UrRtdeConfig {
 }
 
 impl Config {
-    /// The one source that is configured, and its key.
+    /// Returns the key and the settings of the one configured source.
     ///
     /// # Errors
     /// If there is none, or more than one.
@@ -219,18 +220,18 @@ impl Config {
         }
     }
 
-    /// The path in it, so that the program can resolve it against the pipeline file.
+    /// Returns the path in the settings, so that the program can resolve it against the pipeline file.
     pub fn path_mut(&mut self) -> Option<&mut PathBuf> {
         let given = SOURCES.iter().find(|entry| (entry.given)(self).is_some())?;
         (given.given_mut)(self)?.path_mut()
     }
 }
 
-/// Opens the source that `config` names, paced as it says unless it is live. `robot` is needed by
-/// `simulate` only.
+/// Opens the source that `config` names, paced at its rate unless it is live. Only `simulate` needs
+/// `robot`.
 ///
 /// # Errors
-/// If the source cannot be opened; [`IngestError::is_input`] tells whose fault that is.
+/// If the source cannot be opened; [`IngestError::is_input`] distinguishes faults of the input from others.
 pub fn open(
     config: &Config,
     setup: &Setup,

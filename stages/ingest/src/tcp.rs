@@ -1,33 +1,33 @@
-//! Connections over TCP, and why there is none.
+//! TCP connections, and the reasons for their failure.
 
 use std::io::ErrorKind;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-/// Why an address cannot be reached.
+/// Reasons why an address cannot be reached.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Unreachable {
-    /// The name cannot be looked up.
+    /// A name that cannot be resolved.
     #[error("its name is not known: {0}")]
     Name(String),
-    /// The name stands for nothing.
+    /// A name without an address.
     #[error("its name has no address")]
     NoAddress,
-    /// The host is there, and nobody listens on the port.
+    /// A reachable host without a listener on the port.
     #[error("connection refused")]
     Refused,
-    /// Nothing came back in time.
+    /// A timeout.
     #[error("no answer")]
     NoAnswer,
-    /// Something else.
+    /// Another error.
     #[error("{0}")]
     Other(String),
 }
 
-/// Connects to `host:port`, and gives each of its addresses this long to answer.
+/// Connects to `host:port`, with the timeout `within` for each of its addresses.
 ///
 /// # Errors
-/// Why the last address could not be reached.
+/// The reason why the last address could not be reached.
 pub(crate) fn connect(address: &str, within: Duration) -> Result<TcpStream, Unreachable> {
     let addresses = address
         .to_socket_addrs()

@@ -1,7 +1,7 @@
 //! Live joint states of a Universal Robots controller over RTDE, without ROS.
 //!
-//! A thread talks to the controller and puts its packages into a bounded queue, where the oldest gives way; the rest is
-//! done by whoever asks for samples.
+//! A thread receives the controller's packages and puts them into a bounded queue, which drops the oldest when full.
+//! Packing is done by the thread that requests samples.
 
 mod clock;
 mod connection;
@@ -26,20 +26,20 @@ use clock::Clock;
 use connection::{Data, Shared, now_ns};
 use field::{JOINTS, Part};
 
-/// How long a sample waits for what belongs to it \[ns\]: not at all, because it came in one package.
+/// Longest wait of a sample for its other parts \[ns\]: none, since all parts come in one package.
 const WAIT_NS: i64 = 0;
-/// Longest time that a step waits for a package.
-/// Resolution: how soon a stop is noticed, against how often the stage wakes up.
+/// Longest wait of a step for a package.
+/// Resolution: latency of a stop, against the number of wake-ups.
 const LONGEST_WAIT: Duration = Duration::from_millis(50);
-/// Bounds the time of a step.
-/// Resolution: how soon a stop is noticed, against the cost of a step.
+/// Maximum number of packages per step.
+/// Resolution: latency of a stop, against the cost of a step.
 const PACKAGES_PER_STEP: usize = 64;
-/// A source that gave nothing for so long is asked why.
+/// Silence after which a fault is reported.
 const SILENT_AFTER: Duration = Duration::from_secs(1);
-/// The first attempt to connect is over by then.
+/// Time within which the first attempt to connect ends.
 const CONNECTED_WITHIN: Duration = Duration::from_secs(3);
 
-/// A source that listens to a controller. It has no end; a controller that comes back is heard again.
+/// A source that reads from a controller. It has no end; it resumes when a lost controller reconnects.
 #[derive(Debug)]
 pub struct UrRtdeSource {
     settings: UrRtdeConfig,
@@ -53,10 +53,10 @@ pub struct UrRtdeSource {
 }
 
 impl UrRtdeSource {
-    /// Begins to connect. The controller need not be there yet.
+    /// Starts connecting. The controller need not be reachable yet.
     ///
     /// # Errors
-    /// If the arm's six joints are not those of the cell, or a payload has no link to be attached to.
+    /// If the arm's six joints are not those of the cell, or a payload has no link to attach to.
     pub fn open(
         settings: &UrRtdeConfig,
         config: &Config,
@@ -86,12 +86,12 @@ impl UrRtdeSource {
         })
     }
 
-    /// Packages that the controller left out, or that were lost while there was no connection.
+    /// Returns the number of packages that the controller skipped or that were lost during a disconnection.
     pub fn lost(&self) -> u64 {
         self.clock.lost()
     }
 
-    /// What it has counted in packing.
+    /// Returns the counts of packed and refused messages.
     pub fn pack_counts(&self) -> Counts {
         self.packer.counts()
     }
@@ -127,7 +127,7 @@ impl UrRtdeSource {
         }
     }
 
-    /// Tells of the payload when it changes.
+    /// Reports the payload to the packer when it changes.
     fn attach(&mut self, data: &Data, header: &ros::Header) {
         let of = |part: Part| &data.numbers[part.place()];
         let (com, inertia) = (of(Part::CentreOfMass), of(Part::Inertia));
@@ -177,7 +177,7 @@ impl Source<JointState> for UrRtdeSource {
     }
 
     fn dropped(&self) -> u64 {
-        // A package that overflowed leaves a hole in the controller's time, too, and is counted there.
+        // The clock also counts packages dropped by the queue, since they leave a gap in the controller's time.
         self.packer.counts().dropped() + self.timeless + self.clock.lost()
     }
 
@@ -204,7 +204,7 @@ impl Source<JointState> for UrRtdeSource {
     }
 }
 
-/// The names of the six joints, from base to wrist.
+/// Returns the names of the six joints, from base to wrist.
 fn joint_names(settings: &UrRtdeConfig, setup: &Setup) -> Result<Vec<String>, ConfigError> {
     let names = settings.joints.as_ref().unwrap_or(&setup.joint_names);
     if names.len() != JOINTS {

@@ -1,8 +1,8 @@
 //! Live joint states over Zenoh: ROS 2 nodes with `rmw_zenoh`, nodes behind `zenoh-bridge-ros2dds`, or
 //! tauscope's own keys.
 //!
-//! A subscriber only puts bytes into a bounded queue, where the oldest gives way; the rest is done by
-//! whoever asks for samples.
+//! A subscriber only puts bytes into a bounded queue, which drops the oldest when full. Decoding and packing
+//! are done by the thread that requests samples.
 
 mod attachment;
 mod diagnosis;
@@ -36,38 +36,38 @@ use rivals::Rivals;
 use waiting::{Role, Waiting};
 use watch::Watch;
 
-/// How long a sample waits for the command of its instant \[ns\].
+/// Longest wait of a sample for the command of its instant \[ns\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const WAIT_NS: i64 = 10_000_000;
-/// Longest time that a step waits for a message.
-/// Resolution: how soon a stop is noticed, against how often the stage wakes up.
+/// Longest wait of a step for a message.
+/// Resolution: latency of a stop, against the number of wake-ups.
 const LONGEST_WAIT: Duration = Duration::from_millis(50);
-/// How long a step waits for a message while a sample waits for its command.
-/// Resolution: the delay of a sample without a command, against how often the stage wakes up.
+/// Longest wait of a step for a message while a sample waits for its command.
+/// Resolution: the delay of a sample without a command, against the number of wake-ups.
 const SHORTEST_WAIT: Duration = Duration::from_millis(2);
-/// Bounds the time of a step.
-/// Resolution: how soon a stop is noticed, against the cost of a step.
+/// Maximum number of messages per step.
+/// Resolution: latency of a stop, against the cost of a step.
 const MESSAGES_PER_STEP: usize = 64;
-/// A joint state of sixteen joints has 1 kB.
+/// Maximum size of a message; a joint state of sixteen joints has 1 kB.
 /// Resolution: memory; 64 times the largest joint state.
 const MAX_PAYLOAD_BYTES: usize = 65_536;
 
-/// What a [`ZenohSource`] has counted.
+/// Message counts of a [`ZenohSource`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ZenohCounts {
-    /// Messages that came.
+    /// Received messages.
     pub received: u64,
-    /// Messages that gave way in the queue because the pipeline was busy.
+    /// Messages that the queue dropped because the pipeline was busy.
     pub overflowed: u64,
-    /// Messages that were lost on the way: holes in the publishers' numbers.
+    /// Messages lost in transport: gaps in the publishers' sequence numbers.
     pub lost: u64,
-    /// Messages that are not what their topic says.
+    /// Messages that cannot be decoded as their topic's type.
     pub undecodable: u64,
     /// States of a second publisher of the same joints.
     pub rival: u64,
 }
 
-/// A source that listens. It has no end; a publisher that comes back is heard again.
+/// A source that subscribes. It has no end; it resumes when a lost publisher returns.
 pub struct ZenohSource {
     /// Keeps the subscriptions alive.
     session: Session,
@@ -77,7 +77,7 @@ pub struct ZenohSource {
     rivals: Rivals,
     hashes: keys::HashWatch,
     message: ros::JointState,
-    /// By role, because each topic has its own type.
+    /// Decoders by role, because each topic has its own type.
     decoders: BTreeMap<Role, ros::JointStateDecoder>,
     tool: ros::InertiaStamped,
     learn: ros::Bool,
@@ -94,10 +94,10 @@ impl std::fmt::Debug for ZenohSource {
 }
 
 impl ZenohSource {
-    /// Opens a session and subscribes. Endpoints to connect to need not be there yet.
+    /// Opens a session and subscribes. Endpoints to connect to need not be reachable yet.
     ///
     /// # Errors
-    /// If an endpoint or key makes no sense, none is given, or an endpoint cannot be listened on.
+    /// If an endpoint or key is invalid, no endpoint is given, or an endpoint cannot be listened on.
     pub fn open(zenoh: &ZenohConfig, config: &Config, setup: &Setup) -> Result<Self, IngestError> {
         let session = zenoh::open(session_config(zenoh)?)
             .wait()
@@ -161,7 +161,7 @@ impl ZenohSource {
         })
     }
 
-    /// What it has counted on the way in.
+    /// Returns the counts of received messages.
     pub fn counts(&self) -> ZenohCounts {
         ZenohCounts {
             overflowed: self.queue.overflowed(),
@@ -171,17 +171,17 @@ impl ZenohSource {
         }
     }
 
-    /// What it has counted in packing.
+    /// Returns the counts of packed and refused messages.
     pub fn pack_counts(&self) -> Counts {
         self.packer.counts()
     }
 
-    /// Whether the session is connected to anybody.
+    /// Whether the session is connected to a router or peer.
     pub fn is_connected(&self) -> bool {
         scout::connected(&self.session) > 0
     }
 
-    /// Reads a message into the place of its role.
+    /// Decodes a message into the buffer of its role.
     fn decode(&mut self, waiting: &Waiting, payload: &[u8]) -> Result<(), ros::DecodeError> {
         let (hash, decoded) = match waiting.role {
             Role::Tool => (
@@ -265,7 +265,7 @@ impl Source<JointState> for ZenohSource {
             while let Some(mut sample) = self.packer.pop(now_ns()) {
                 self.watch.sample(&sample, self.packer.counts());
                 if self.watch.is_frozen() {
-                    // What is repeated says nothing of now: no detector may judge it, nor call the robot free.
+                    // A repeated measurement is not current: no detector may judge it, nor report the robot free.
                     sample.header.flags &= !flags::EFFORT_MEASURED;
                     sample.effort = JointState::default().effort;
                 }
@@ -281,7 +281,7 @@ impl Source<JointState> for ZenohSource {
 
     fn dropped(&self) -> u64 {
         let counts = self.counts();
-        // A message that overflowed leaves a hole in the numbers too, where there are numbers.
+        // A message dropped by the queue also leaves a gap in the sequence numbers, if the publisher has any.
         let packed = self.packer.counts();
         packed.dropped() + counts.undecodable + counts.rival + counts.overflowed.max(counts.lost)
     }
@@ -292,7 +292,7 @@ impl Source<JointState> for ZenohSource {
     }
 }
 
-/// The present on the clock of reception.
+/// Returns the current time on the clock of reception.
 fn now_ns() -> i64 {
     SystemTime::now()
         .duration_since(SystemTime::UNIX_EPOCH)
@@ -333,7 +333,7 @@ fn subscribe(
         })
 }
 
-/// A session that talks to the given endpoints only, and tries them again for ever.
+/// Configures a session that uses only the given endpoints and retries them without limit.
 fn session_config(zenoh: &ZenohConfig) -> Result<zenoh::Config, ConfigError> {
     if zenoh.connect.is_empty() && zenoh.listen.is_empty() {
         return Err(ConfigError::NoEndpoint);
@@ -341,8 +341,8 @@ fn session_config(zenoh: &ZenohConfig) -> Result<zenoh::Config, ConfigError> {
     let mut config = zenoh::Config::default();
     let list = |endpoints: &[String]| serde_json::Value::from(endpoints).to_string();
     let settings = [
-        // A router passes on what peers say, as sessions of rmw_zenoh are, to routers and clients, but not to other peers.
-        // A client cannot begin before its router is there.
+        // Sessions of rmw_zenoh are peers. A router forwards their messages to routers and clients, but not to other
+        // peers. A client cannot start before its router is reachable.
         ("mode", "\"router\"".to_owned()),
         ("connect/endpoints", list(&zenoh.connect)),
         ("listen/endpoints", list(&zenoh.listen)),

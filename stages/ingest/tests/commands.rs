@@ -1,5 +1,5 @@
-//! Commands over Zenoh, into the samples of any source.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+//! Commands over Zenoh in the samples of a source.
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
@@ -50,7 +50,7 @@ fn commanded(runs: bool, has_tool_link: bool) -> (Commanded, Session) {
     (source, endpoints(&[], &[&endpoint]).session().unwrap())
 }
 
-/// Asks while the source runs: the answer, and what came out meanwhile.
+/// Sends a request while the source runs; returns the answer, and the samples emitted meanwhile.
 fn asked(source: &mut Commanded, session: &Session, request: Request) -> (Answer, Vec<JointState>) {
     let session = session.clone();
     let asking = std::thread::spawn(move || ask(&session, "demo", &request, PATIENCE).unwrap());
@@ -147,7 +147,7 @@ fn without_samples_a_command_is_refused_soon_and_holds_never() {
 #[test]
 fn a_message_is_a_command_too_and_each_sample_carries_one_at_most() {
     let (mut source, session) = commanded(true, true);
-    // The answer tells that the sessions have met.
+    // An answer means that the sessions are connected.
     asked(&mut source, &session, Request::Learn);
     for seconds in [1, 2, 3] {
         let json = format!(r#"{{"verb": "mute", "seconds": {seconds}}}"#);

@@ -1,5 +1,5 @@
-//! What every source of the table promises, whichever it is.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+//! Properties that every source of the table must have.
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -13,7 +13,7 @@ use tauscope_ingest::{Config, SOURCES, Setup, SimulatedRobot, open};
 const STEP_NS: i64 = 10_000_000;
 const SAMPLES: i64 = 300;
 const JOINTS: &str = "joint1 joint2 joint3 joint4 joint5 joint6 joint7";
-/// The same joints in another order.
+/// The joints in another order.
 const TURNED: &str = "joint7 joint3 joint1 joint2 joint6 joint5 joint4";
 
 fn data(name: &str) -> std::path::PathBuf {
@@ -22,14 +22,14 @@ fn data(name: &str) -> std::path::PathBuf {
         .join(name)
 }
 
-/// Joint j is at 100 j rad and turns slowly, so that nobody is taken for another.
+/// Returns positions that identify the joints: joint j is at 100 j rad and turns slowly.
 fn positions(k: i64) -> Vec<f64> {
     (1..=7)
         .map(|j| 100.0 * f64::from(j) + 0.001 * k as f64)
         .collect()
 }
 
-/// Settings of a source with a little to read, as a file has them; nothing for a live one.
+/// Returns the settings of a source with a small example to read; `None` for a live one.
 fn example(source: &str, folder: &Path) -> Option<String> {
     match source {
         "file" => {
@@ -92,7 +92,7 @@ fn opened(config: &Config, setup: &Setup) -> Box<dyn Source<JointState>> {
     open(config, setup, Some(&robot())).unwrap()
 }
 
-/// Does something with each source that ends.
+/// Runs a check on each source that ends.
 fn each(mut check: impl FnMut(&str, &Config)) {
     let folder = tempfile::tempdir().unwrap();
     for entry in SOURCES {

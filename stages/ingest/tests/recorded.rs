@@ -37,7 +37,7 @@ fn a_bag_comes_out_in_the_cells_order_with_its_commands() {
     let mut messages = Vec::new();
     for i in 0..100_i64 {
         let (ns, q) = (1_000_000 * MS + i * 10 * MS, i as f64);
-        // The command of an instant stands behind the state, as many drivers write it.
+        // The command of an instant follows its state in the file, as many drivers write it.
         messages.push((
             "/joint_states",
             ns + MS,
@@ -228,7 +228,7 @@ const UR: &str = "shoulder_pan_joint shoulder_lift_joint elbow_joint wrist_1_joi
 const FRANKA: &str = "panda_joint1 panda_joint2 panda_joint3 panda_joint4 panda_joint5 \
                       panda_joint6 panda_joint7";
 
-/// Samples and what is dropped of them of a file of `../shared/recordings`.
+/// Reads a file of `../shared/recordings`; returns its samples and the source.
 fn read_shared(test: &str, path: &str, joints: &str) -> Option<(Vec<JointState>, RecordedSource)> {
     let path = shared(test, &format!("recordings/{path}"))?;
     Some(read(&file(&path), &cell(joints)))
@@ -255,7 +255,7 @@ fn a_real_ur10e_in_ampere() {
         s.header
             .has(flags::VELOCITY_MEASURED | flags::EFFORT_MEASURED)
     }));
-    // The same as its owners' table says.
+    // The values must equal those of the table that its authors published.
     let Some(path) = shared("", "recordings/ur10e/csv/20_02_05-20sec_8harm.csv") else {
         return;
     };

@@ -1,4 +1,4 @@
-//! A controller of Universal Robots, over a real socket.
+//! A simulated Universal Robots controller over a real socket.
 #![allow(
     clippy::unwrap_used,
     clippy::float_cmp,
@@ -14,7 +14,7 @@ use tauscope_bus::{JointState, Source, Trouble, flags};
 use tauscope_ingest::{Config, Setup, UrEffort, UrRtdeConfig, UrRtdeSource};
 
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Within this time a live source says what is wrong.
+/// Time within which a live source must report a fault.
 const PROMISED: Duration = Duration::from_secs(5);
 
 fn arm() -> Setup {
@@ -80,7 +80,7 @@ fn packages_become_samples_also_in_pieces() {
             assert!(sample.header.has(wanted), "{i}");
             assert_eq!(sample.tool_mass_kg, 1.5);
             assert_eq!(sample.tool_com_m, [0.01, 0.02, 0.03]);
-            // xx, xy, xz, yy, yz, zz of what the controller has as xx, yy, zz, xy, xz, yz.
+            // Order xx, xy, xz, yy, yz, zz; the controller's order is xx, yy, zz, xy, xz, yz.
             assert_eq!(sample.tool_inertia_kgm2, [1.0, 4.0, 5.0, 2.0, 6.0, 3.0]);
             let since_ns = sample.header.stamp_ns - samples[0].header.stamp_ns;
             assert_eq!(since_ns, i as i64 * 2_000_000);
@@ -107,7 +107,7 @@ fn a_controller_that_goes_is_heard_again() {
     assert_eq!(source.lost(), 1);
 }
 
-/// What a source says of a controller that gives nothing, and how soon.
+/// Returns the trouble that a source reports for a controller without data, which must be within [`PROMISED`].
 fn said(settings: &UrRtdeConfig) -> Trouble {
     let mut source = open(settings);
     let began = Instant::now();

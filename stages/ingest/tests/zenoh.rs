@@ -1,4 +1,4 @@
-//! Live sources over loopback, with publishers as ROS 2 would have them.
+//! Live sources over loopback, with publishers that imitate ROS 2.
 #![allow(
     clippy::unwrap_used,
     clippy::float_cmp,
@@ -17,7 +17,7 @@ use zenoh::{Session, Wait};
 const PATIENCE: Duration = Duration::from_secs(30);
 const MS: i64 = 1_000_000;
 
-/// An endpoint that nobody listens on right now.
+/// Returns an endpoint without a listener.
 fn endpoint() -> String {
     let port = TcpListener::bind("127.0.0.1:0")
         .unwrap()
@@ -34,7 +34,7 @@ fn publisher(listen: &str) -> Session {
     ])
 }
 
-/// A session as a node of `rmw_zenoh` has it behind its router.
+/// Opens a session like that of an `rmw_zenoh` node behind its router.
 fn node(router: &str) -> Session {
     open(&[
         ("mode", "\"peer\""),
@@ -78,7 +78,7 @@ fn body(message: &ros::JointState) -> Vec<u8> {
     body
 }
 
-/// The same as `ros2_control` tells it, with a sensor among the joints. An effort that is NaN is left out.
+/// Encodes a state like `ros2_control`, with a sensor among the joints. An effort that is NaN is left out.
 fn dynamic_body(state: &ros::JointState) -> Vec<u8> {
     let interfaces = |named: &[(&str, f64)]| ros::InterfaceValue {
         interface_names: named.iter().map(|(name, _)| (*name).to_owned()).collect(),
@@ -103,7 +103,7 @@ fn dynamic_body(state: &ros::JointState) -> Vec<u8> {
     body
 }
 
-/// Puts states until the first one comes through: a subscription takes its time to become known.
+/// Publishes states until the first one arrives, since a subscription takes time to be matched.
 fn meet(session: &Session, key: &str, source: &mut ZenohSource) {
     let deadline = Instant::now() + PATIENCE;
     let mut out = Collect(Vec::new());
@@ -117,7 +117,7 @@ fn meet(session: &Session, key: &str, source: &mut ZenohSource) {
     }
 }
 
-/// Steps until `count` samples have come.
+/// Steps until `count` samples have arrived.
 fn receive(source: &mut ZenohSource, count: usize) -> Vec<JointState> {
     let deadline = Instant::now() + PATIENCE;
     let mut out = Collect(Vec::new());
@@ -173,7 +173,7 @@ fn rmw_zenoh_with_commands_and_lost_messages() {
             .put(&commands, body(&state(stamp_ns, "b a", &[-q, q], &[])))
             .wait()
             .unwrap();
-        // Number 20 is lost on the way.
+        // Number 20 is lost in transport.
         let put = session
             .put(
                 &states,
@@ -236,7 +236,7 @@ fn a_bridge_and_our_own_keys() {
         };
         let mut source = ZenohSource::open(&zenoh, &Config::default(), &cell("a b")).unwrap();
         meet(&session, key, &mut source);
-        // What is no joint state is counted, and does no harm.
+        // A message that is not a joint state is counted and skipped.
         session.put(key, vec![1, 2, 3]).wait().unwrap();
         session
             .put(key, body(&state(5000 * MS, "a b", &[1.0, 2.0], &[])))
@@ -264,7 +264,7 @@ fn a_publisher_that_comes_late_and_one_that_comes_back_are_heard() {
     }
 }
 
-/// As `meet`, with stamps that go on from `first_ms`.
+/// Like [`meet`], with stamps from `first_ms` on.
 fn meet_at(session: &Session, key: &str, source: &mut ZenohSource, first_ms: i64) {
     let deadline = Instant::now() + PATIENCE;
     let mut out = Collect(Vec::new());

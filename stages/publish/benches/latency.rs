@@ -1,4 +1,4 @@
-//! From a detection that the publisher takes to what a listener has: percentiles, over loopback.
+//! Latency from a detection at the publisher to its message at a subscriber: percentiles, over loopback.
 //!
 //!     cargo bench -p tauscope-publish --bench latency
 
@@ -35,7 +35,7 @@ fn main() {
     show("Modbus: read of `free`", &over_modbus());
 }
 
-/// A detection that changes the alarm, each time.
+/// Feeds a detection that changes the alarm each time.
 fn alternating(publisher: &mut Publisher, at: i64) {
     let detection = says(at, if at % 2 == 0 { "contact" } else { "free" });
     publisher

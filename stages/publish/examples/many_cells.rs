@@ -1,11 +1,11 @@
-//! Publishers of many cells in one process, each with a session of its own, told made-up samples: for a trial of a
-//! router and a fleet host (`tests/faults/thousand_cells.py`).
+//! Publishers of many cells in one process, each with a session of its own, fed with synthetic samples: for a trial
+//! of a router and a fleet host (`tests/faults/thousand_cells.py`).
 //!
 //!     many_cells ENDPOINT PREFIX CELLS RATE_HZ SECONDS
 //!
-//! The cells are `PREFIX0`, `PREFIX1` and so on; each tenth is touched once a minute. Nothing but status and contacts
-//! leaves them. At the end one line of JSON says how many samples they were told, how many messages could not be sent,
-//! how late the last one was, and how many contacts each cell has had.
+//! The cells are `PREFIX0`, `PREFIX1` and so on; every tenth is touched once a minute. They publish only status and
+//! contacts. At the end one line of JSON has the number of samples fed, the number of messages that could not be
+//! sent, the largest delay of a sample, and the number of contacts of each cell.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -14,12 +14,12 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use tauscope_bus::{Detection, Health, JointState, SampleKind, SampleRef, Sink as _, flags};
 use tauscope_publish::{Config, Facts, Publisher, Setup, StreamInfo, ZenohConfig};
 
-/// Which cells are touched, how often, and for how long.
+/// One cell in this many is touched; the other constants are the period, the first time and the duration.
 const TOUCHED_EVERY: usize = 10;
 const TOUCH_EVERY_S: u64 = 60;
 const TOUCH_AFTER_S: u64 = 15;
 const TOUCH_S: f64 = 0.8;
-/// Threads that tell the publishers; each has its share of the cells.
+/// Number of threads that feed the publishers, each a part of the cells.
 const THREADS: usize = 2;
 
 type Failure = Box<dyn Error + Send + Sync>;
@@ -73,7 +73,7 @@ impl Cell {
         })
     }
 
-    /// Tells what happens at sample `number`.
+    /// Feeds sample `number` to the publisher.
     fn tell(&mut self, number: u64, rate_hz: u64) -> Result<(), Failure> {
         let mut state = JointState::default();
         state.header.stamp_ns = now_ns();
@@ -126,7 +126,7 @@ fn now_ns() -> i64 {
     })
 }
 
-/// Tells a share of the cells all their samples in time; how late the latest one was.
+/// Feeds all samples to a part of the cells when they are due; returns the largest delay.
 fn play(cells: &mut [Cell], rate_hz: u64, seconds: u64) -> Result<Duration, Failure> {
     let begin = Instant::now();
     let mut latest = Duration::ZERO;
@@ -165,7 +165,7 @@ fn main() -> Result<(), Failure> {
         });
         ended.collect::<Result<Vec<_>, _>>()
     })?;
-    // What the last messages say is still on its way.
+    // The last messages are still in transit.
     std::thread::sleep(Duration::from_secs(2));
     let contacts: BTreeMap<&str, u64> = cells
         .iter()

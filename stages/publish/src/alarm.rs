@@ -1,4 +1,4 @@
-//! The life of an alarm: a pure state machine over detections and commands. Time is that of the samples.
+//! States of an alarm: a pure state machine over detections and commands. Time is that of the samples.
 //!
 //! ```text
 //!              contact begins                     collision begins
@@ -14,34 +14,34 @@
 //!
 //! - A collision is latched: it never ends by itself.
 //! - A collision that begins after the acknowledgement is a new one.
-//! - While muted, contacts and collisions raise no stop and none is latched. A collision that was latched before stays.
-//!   One that still lasts when the lease ends is latched then.
-//! - Before every detector has judged a sample, and while one cannot judge, nothing is free.
+//! - While muted, contacts and collisions raise no stop, and none is latched. An earlier latch stays. A collision
+//! that   still lasts when the lease ends is latched then.
+//! - The alarm is not free before every detector has judged a sample, nor while one cannot judge.
 
 use tauscope_bus::command::MuteLease;
 use tauscope_bus::{Command, Detection, Verb, flags};
 
 use crate::config::Latch;
 
-/// Commands that wait for the detections of their instant at most.
+/// Maximum number of commands that wait for the detections of their instant.
 const MAX_WAITING: usize = 64;
 
-/// Where an alarm stands.
+/// States of an alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// A detector cannot judge, or has said nothing yet.
+    /// A detector cannot judge, or has not sent a detection yet.
     NotReady,
     /// Nothing touches the robot.
     Free,
     /// Something touches it.
     Contact,
-    /// It has collided, and nobody has acknowledged that.
+    /// It has collided, and the collision is not acknowledged.
     Collision,
-    /// Somebody has acknowledged the collision, which is not over yet.
+    /// The collision is acknowledged, but not over yet.
     Acknowledged,
 }
 
-/// The latch.
+/// States of the latch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Latched {
     No,
@@ -49,7 +49,7 @@ enum Latched {
     Acknowledged,
 }
 
-/// What a detector said last.
+/// Newest verdict of a detector.
 #[derive(Debug, Clone, Copy, Default)]
 struct View {
     ready: bool,
@@ -64,14 +64,14 @@ pub struct Alarm {
     views: Vec<View>,
     latched: Latched,
     lease: Option<MuteLease>,
-    /// By stamp.
+    /// Commands that wait, ordered by stamp.
     waiting: Vec<(i64, Command)>,
     now_ns: i64,
 }
 
 impl Alarm {
-    /// The alarm of a cell with so many detectors. After a restart it is not known what was latched: it begins
-    /// with a collision then, for somebody to look.
+    /// Creates the alarm of a cell with this number of detectors. After a restart the earlier latch is unknown, so
+    /// the alarm begins with a collision that must be acknowledged.
     pub fn new(latch: Latch, detectors: usize, restarted: bool) -> Self {
         Self {
             latch,
@@ -87,8 +87,8 @@ impl Alarm {
         }
     }
 
-    /// Takes a command that holds from `stamp_ns` on: from the first detection with that stamp or a later one,
-    /// whichever of the two streams was faster.
+    /// Takes a command. It takes effect at the first detection with the stamp `stamp_ns` or a later one, whichever of
+    /// the two streams arrives first.
     pub fn command(&mut self, stamp_ns: i64, command: Command) {
         if self.waiting.len() == MAX_WAITING {
             self.waiting.remove(0);
@@ -97,12 +97,12 @@ impl Alarm {
         self.waiting.insert(at, (stamp_ns, command));
     }
 
-    /// Takes what detector number `detector` says of a sample.
+    /// Takes a detection of detector number `detector`.
     pub fn detection(&mut self, detector: usize, detection: &Detection) {
         let header = &detection.header;
         self.now_ns = header.stamp_ns;
         if header.has(flags::RESET) {
-            // The clock of the lease is void.
+            // The lease refers to the clock before the reset.
             self.lease = None;
         }
         while self
@@ -151,7 +151,7 @@ impl Alarm {
         self.views.iter().any(|view| view.alarm)
     }
 
-    /// Where the alarm stands.
+    /// Returns the state of the alarm.
     pub fn state(&self) -> State {
         match self.latched {
             Latched::Unseen => State::Collision,
@@ -162,7 +162,7 @@ impl Alarm {
         }
     }
 
-    /// Whether the robot may move, as far as detections go.
+    /// Whether the robot may move according to the detections.
     pub fn is_free(&self) -> bool {
         match self.state() {
             State::Free => true,
@@ -171,7 +171,7 @@ impl Alarm {
         }
     }
 
-    /// What is left of a mute \[s\]; 0 without one.
+    /// Returns the remaining time of a mute \[s\]; 0 without one.
     pub fn muted_s(&self) -> f64 {
         let left_ns = self.lease.map_or(0, |lease| lease.left_ns(self.now_ns));
         left_ns as f64 * 1e-9
@@ -181,7 +181,7 @@ impl Alarm {
         self.muted_s() > 0.0
     }
 
-    /// Stamp of the newest detection \[ns since the epoch\].
+    /// Returns the stamp of the newest detection \[ns since the epoch\].
     pub fn now_ns(&self) -> i64 {
         self.now_ns
     }

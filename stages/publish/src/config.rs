@@ -5,19 +5,19 @@ use std::net::SocketAddr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the cell is told, and how. At least one of `zenoh` and `modbus`.
+/// Outputs to the cell. At least one of `zenoh` and `modbus` must be given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// Messages over Zenoh: JSON, and ROS 2 where wanted.
+    /// Messages over Zenoh: JSON, and optionally ROS 2.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zenoh: Option<ZenohConfig>,
     /// A Modbus TCP server for a PLC.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modbus: Option<ModbusConfig>,
-    /// Which contacts stay until somebody acknowledges them.
+    /// Contacts that stay latched until they are acknowledged.
     pub latch: Latch,
-    /// Without a sample of each detector for so long, everything reads as stop \[s\].
+    /// Silence of any one detector after which all outputs read as stop \[s\].
     #[schemars(range(min = 0.02, max = 60.0))]
     pub stop_after_s: f64,
 }
@@ -33,30 +33,30 @@ impl Default for Config {
     }
 }
 
-/// Which contacts stay until somebody acknowledges them.
+/// Contacts that stay latched until they are acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Latch {
-    /// Those that the detector calls a collision.
+    /// Contacts that the detector classifies as collisions.
     #[default]
     Collision,
-    /// All: for a detector that does not tell a collision from a contact that is meant.
+    /// All contacts: for a detector that does not distinguish collisions from intended contacts.
     Contact,
 }
 
-/// Messages over Zenoh. At least one of `connect` and `listen` must be given: nothing is found by multicast.
+/// Messages over Zenoh. At least one of `connect` and `listen` must be given: multicast discovery is off.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ZenohConfig {
-    /// Endpoints to connect to, e.g. `tcp/localhost:7447`; tried again until they answer.
+    /// Endpoints to connect to, e.g. `tcp/localhost:7447`; retried until they answer.
     pub connect: Vec<String>,
     /// Endpoints to listen on.
     pub listen: Vec<String>,
     /// Whether JSON is published under `<cell>/<topic>`.
     pub json: bool,
-    /// Whether `tauscope fleet` sees the cell: a liveliness token, the status once a second, each contact.
+    /// Whether the cell reports to `tauscope fleet`: a liveliness token, the status once a second, each contact.
     pub fleet: bool,
-    /// ROS 2 messages as `rmw_zenoh` expects them; without it, none.
+    /// ROS 2 messages as `rmw_zenoh` expects them; by default none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ros2: Option<Ros2Config>,
 }
@@ -77,7 +77,7 @@ impl Default for ZenohConfig {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Ros2Config {
-    /// `ROS_DOMAIN_ID` of the listeners.
+    /// `ROS_DOMAIN_ID` of the subscribers.
     #[schemars(range(max = 232))]
     pub domain: u32,
     /// Namespace of the topics; by default the cell's name.
@@ -89,11 +89,11 @@ pub struct Ros2Config {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ModbusConfig {
-    /// Address and port that it listens on. Whoever reaches it can read and acknowledge: Modbus has no passwords.
+    /// Address and port to listen on. Any client that reaches it can read and acknowledge: Modbus has no passwords.
     #[schemars(with = "String")]
     pub listen: SocketAddr,
-    /// A client that asks nothing for so long is disconnected: one whose cable was pulled would keep its place for ever
-    /// \[s\].
+    /// Time without a request after which a client is disconnected \[s\]. Otherwise a client with an unplugged cable
+    /// would occupy its slot for ever.
     #[schemars(range(min = 0.1, max = 86_400.0))]
     pub idle_s: f64,
 }
@@ -102,37 +102,38 @@ impl Default for ModbusConfig {
     fn default() -> Self {
         Self {
             listen: SocketAddr::from(([127, 0, 0, 1], 1502)),
-            // Resolution: a PLC asks several times a second; a person who tries it out waits no longer for a place.
+            // Resolution: a PLC polls several times a second; a person who tries it out waits at most this long for a
+            // slot.
             idle_s: 60.0,
         }
     }
 }
 
-/// What is wrong with a configuration.
+/// Errors in the configuration of a publisher.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ConfigError {
-    /// Nothing is told to anybody.
-    #[error("a publisher that tells nobody; give `zenoh` or `modbus`")]
+    /// A publisher without an output.
+    #[error("the publisher has no output; give `zenoh` or `modbus`")]
     Nobody,
-    /// Nothing can reach it.
+    /// A Zenoh output without endpoints.
     #[error("`zenoh` needs at least one endpoint in `connect` or `listen`")]
     NoEndpoint,
-    /// Neither form of message.
+    /// A Zenoh output without messages.
     #[error("`zenoh` publishes nothing; give `json: true`, `fleet: true` or `ros2: {{}}`")]
     NoMessages,
-    /// No detector, whose verdicts are what it is about.
+    /// A publisher without a detector.
     #[error("a publisher listens to at least one detector")]
     NoDetector,
-    /// Several cells.
+    /// A publisher for several cells.
     #[error("a publisher serves one cell; make a publisher for each")]
     ManyCells,
 }
 
 impl Config {
-    /// Whether it can be run.
+    /// Checks that the publisher can run.
     ///
     /// # Errors
-    /// What keeps it from running.
+    /// The first fault found.
     pub fn check(&self) -> Result<(), ConfigError> {
         if self.zenoh.is_none() && self.modbus.is_none() {
             return Err(ConfigError::Nobody);

@@ -5,7 +5,7 @@ use tauscope_bus::{Detection, Health};
 
 use crate::message::{AlarmMessage, AlarmState, CommandMessage, DetectionMessage, EventMessage};
 
-/// One status at the time `stamp_ns`.
+/// Builds an array of one status at the time `stamp_ns`.
 fn array(
     stamp_ns: i64,
     level: Level,
@@ -30,7 +30,7 @@ fn array(
     }
 }
 
-/// What a detector says; `label` tells it from the cell's other detectors.
+/// Converts a detection; `label` distinguishes the detector from the cell's others.
 pub fn of_detection(message: &DetectionMessage, label: &str, cell: &str) -> DiagnosticArray {
     let level = match (message.alarm, message.state.as_str()) {
         (true, "collision") => Level::Error,
@@ -74,7 +74,7 @@ pub fn of_detection(message: &DetectionMessage, label: &str, cell: &str) -> Diag
     array(message.stamp_ns, level, label, words, cell, values)
 }
 
-/// Where the alarm stands.
+/// Converts the state of the alarm.
 pub fn of_alarm(alarm: &AlarmMessage, cell: &str) -> DiagnosticArray {
     let level = match alarm.state {
         AlarmState::Silent | AlarmState::NotReady => Level::Stale,
@@ -105,7 +105,7 @@ pub fn of_alarm(alarm: &AlarmMessage, cell: &str) -> DiagnosticArray {
     array(alarm.stamp_ns, level, "alarm", words, cell, values)
 }
 
-/// A command that was taken.
+/// Converts an accepted command.
 pub fn of_command(command: &CommandMessage, cell: &str) -> DiagnosticArray {
     let values = command.arguments.iter();
     let values = values.map(|(name, value)| (name.as_str(), value.clone()));
@@ -119,7 +119,7 @@ pub fn of_command(command: &CommandMessage, cell: &str) -> DiagnosticArray {
     )
 }
 
-/// How a stage fares.
+/// Converts the health of a stage.
 pub fn of_health(health: &Health, cell: &str) -> DiagnosticArray {
     let (level, words) = match health.dropped {
         0 => (Level::Ok, "nothing lost".to_owned()),
@@ -143,7 +143,7 @@ pub fn of_health(health: &Health, cell: &str) -> DiagnosticArray {
     )
 }
 
-/// Whether a detection is worth a message of its own: something begins, ends or changes.
+/// Whether a detection needs a message of its own: something begins, ends or changes.
 pub fn is_news(before: Option<&Detection>, now: &Detection) -> bool {
     now.event != 0
         || before.is_none_or(|before| (before.state, before.alarm()) != (now.state, now.alarm()))

@@ -1,4 +1,4 @@
-//! Why nothing can be published.
+//! Errors of publishing.
 
 use std::net::SocketAddr;
 
@@ -6,33 +6,33 @@ use tauscope_bus::LinkError;
 
 use crate::config::ConfigError;
 
-/// Why nothing can be published.
+/// Errors of publishing.
 #[derive(Debug, thiserror::Error)]
 pub enum PublishError {
-    /// The configuration makes no sense.
+    /// An invalid configuration.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// Zenoh cannot listen or connect.
+    /// A Zenoh session that cannot listen or connect.
     #[error(transparent)]
     Session(#[from] LinkError),
-    /// Zenoh does not take a key, a token or a message.
+    /// A key, token or message that Zenoh rejects.
     #[error("zenoh: {0}")]
     Zenoh(String),
-    /// A ROS 2 message cannot be written.
+    /// A ROS 2 message that cannot be encoded.
     #[error(transparent)]
     Cdr(#[from] tauscope_archive::ros::EncodeError),
-    /// A JSON message cannot be written.
+    /// A JSON message that cannot be encoded.
     #[error("cannot write JSON: {0}")]
     Json(#[from] serde_json::Error),
-    /// Nobody can be served.
+    /// A Modbus server that cannot listen.
     #[error("cannot serve Modbus at {address}: {source}; is the port taken, or below 1024?")]
     Modbus {
-        /// Where it was to listen.
+        /// Address to listen on.
         address: SocketAddr,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A sample came that nobody announced.
+    /// A sample of a stage that is not an input of the publisher.
     #[error("a sample came from stage `{stage}`, which the publisher does not listen to")]
     UnknownStage {
         /// The stage.

@@ -1,4 +1,4 @@
-//! What the fleet is told of the cell: once a second how it fares, and each contact as it comes.
+//! Reports of the cell to its fleet: the status once a second, and each contact as it occurs.
 
 use std::os::unix::process::parent_id;
 use std::time::{Duration, Instant};
@@ -12,10 +12,10 @@ use crate::message::{AlarmMessage, HealthMessage, RecordMessage, STATUS_VERSION,
 use crate::presence::{Presence, now_ns};
 use crate::report::{Report, Residual};
 
-/// How often the status is told. Resolution: a fleet host calls a cell stale after a few of them.
+/// Period of the status. Resolution: a fleet host calls a cell stale after a few of them.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// What the fleet is told of a cell and its files.
+/// Facts about a cell and its files, reported to the fleet.
 #[derive(Debug, Clone, Default)]
 pub struct Facts {
     /// Unit of the measured effort.
@@ -24,9 +24,9 @@ pub struct Facts {
     pub urdf_sha256: Option<String>,
     /// SHA-256 of the twin's file.
     pub twin_sha256: Option<String>,
-    /// By joint, the residual's standard deviation when the twin was calibrated \[effort unit\].
+    /// Standard deviation of each joint's residual at the twin's calibration \[effort unit\].
     pub calibrated: Vec<Option<f64>>,
-    /// Where the cell's recorder writes, `*` for numbers and times in a name and `, ` between names.
+    /// Paths to which the cell's recorder writes, with `*` for numbers and times in a name and `, ` between names.
     pub archive: Option<String>,
 }
 
@@ -35,12 +35,12 @@ pub struct Fleet {
     presence: Presence,
     report: Report,
     residual: Residual,
-    /// What does not change.
+    /// The last status, from which the next one takes the constant fields.
     status: StatusMessage,
     told: Option<Instant>,
-    /// The newest sample: its stamp, and when it came.
+    /// Stamp of the newest sample, and its time of arrival.
     newest: Option<(i64, Instant)>,
-    /// The supervisor. A run whose supervisor was killed ends as if in order, but did not.
+    /// Process id of the supervisor. Only a run whose supervisor is alive can have ended normally.
     supervisor: u32,
 }
 
@@ -48,7 +48,7 @@ impl Fleet {
     /// Announces the cell.
     ///
     /// # Errors
-    /// If Zenoh takes a key for none.
+    /// If Zenoh rejects a key.
     pub fn open(
         session: &Session,
         cell: &str,
@@ -58,7 +58,7 @@ impl Fleet {
         facts: Facts,
         takes_commands: bool,
     ) -> Result<Self, PublishError> {
-        // The session's id is another one in each process.
+        // The id of the session differs in each process.
         let instance = session.zid().to_string();
         Ok(Self {
             presence: Presence::open(session, cell, &instance)?,
@@ -95,12 +95,12 @@ impl Fleet {
         })
     }
 
-    /// A sample with this stamp came.
+    /// Records the arrival of a sample with this stamp.
     pub fn sample(&mut self, stamp_ns: i64) {
         self.newest = Some((stamp_ns, Instant::now()));
     }
 
-    /// Takes what the twin made of a sample.
+    /// Takes a sample of the twin.
     pub fn twin(&mut self, sample: &TwinState) {
         self.residual.twin(sample);
     }
@@ -110,12 +110,13 @@ impl Fleet {
         self.report.command(stamp_ns, command);
     }
 
-    /// Takes how a stage fares.
+    /// Takes the health of a stage.
     pub fn health(&mut self, health: &Health) {
         self.report.take_health(HealthMessage::from(health));
     }
 
-    /// Takes what detector number `at`, called `label`, says. `judges`: it tells of contacts; the alarm stands at `alarm`.
+    /// Takes a detection of detector number `at`, called `label`. `judges`: whether it reports contacts. `alarm`: the
+    /// state of the alarm.
     pub fn detection(
         &mut self,
         at: usize,
@@ -130,7 +131,7 @@ impl Fleet {
         self.report.detection(at, label, detection, judges, alarm);
     }
 
-    /// Tells what is new, and the status if it is due or the run has `ended`.
+    /// Sends the new records, and the status if it is due, if it changed, or if the run has `ended`.
     ///
     /// # Errors
     /// If a message cannot be sent.
@@ -183,13 +184,13 @@ impl Fleet {
     }
 }
 
-/// Whether a process of this host is ending or has ended: it closes its pipes, by which its children learn of it, before
-/// they get another parent. False where the system does not tell.
+/// Whether a process of this host is ending or has ended; false if the system does not report it. The parent id of
+/// its children does not suffice: they notice that it closes its pipes before they get another parent.
 fn is_exiting(process: u32) -> bool {
     // Field 9 of the line are the kernel's flags (proc(5)), of which PF_EXITING is this one (linux/sched.h).
     const PF_EXITING: u64 = 0x4;
     let line = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
-    // The name before may have spaces and brackets in it.
+    // The process name in front may contain spaces and brackets.
     let behind = line.rsplit(')').next().unwrap_or_default();
     let flags = behind.split_whitespace().nth(6);
     flags.is_some_and(|flags| {
@@ -199,7 +200,7 @@ fn is_exiting(process: u32) -> bool {
     })
 }
 
-/// The computer's name; empty where the system does not tell it.
+/// Returns the computer's name; empty if the system does not report it.
 fn host() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     name.trim().to_owned()

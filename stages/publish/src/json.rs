@@ -18,7 +18,7 @@ pub struct Json {
 }
 
 impl Json {
-    /// For the topics of `cell`.
+    /// Creates a publisher for the topics of `cell`.
     pub fn new(session: &Session, cell: &str) -> Self {
         Self {
             session: session.clone(),
@@ -27,7 +27,7 @@ impl Json {
         }
     }
 
-    /// Publishes a message; whoever does not take it loses it.
+    /// Publishes a message without waiting; a subscriber that is too slow loses it.
     ///
     /// # Errors
     /// If the message or its key cannot be written.

@@ -1,7 +1,7 @@
-//! What the cell is told: ROS 2 messages and JSON over Zenoh, Modbus registers for a PLC, and the life of the alarm
-//! behind them. The outside of it is described in `docs/publish.md`.
+//! Outputs to the cell: ROS 2 messages and JSON over Zenoh, Modbus registers for a PLC, and the states of the alarm
+//! behind them. The interface is described in `docs/publish.md`.
 //!
-//! Not a safety function: it must not be what protects a person.
+//! Not a safety function: it must not be used to protect a person.
 
 mod alarm;
 mod config;

@@ -1,4 +1,4 @@
-//! The JSON messages. Their JSON Schema is made from these types: `tauscope schema --messages`.
+//! JSON messages. Their JSON Schema is generated from these types: `tauscope schema --messages`.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,24 +13,24 @@ pub use status::{
     ResidualMessage, STATUS_VERSION, StatusMessage,
 };
 
-/// Under `<cell>/alarm`: what the cell is to do.
+/// Under `<cell>/alarm`: the state of the alarm, and whether the robot may move.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AlarmMessage {
     /// Stamp of the newest detection \[ns since the epoch\].
     pub stamp_ns: i64,
-    /// Where the alarm stands.
+    /// State of the alarm.
     pub state: AlarmState,
-    /// Whether the robot may move, as far as detections go.
+    /// Whether the robot may move according to the detections.
     pub free: bool,
     /// Whether a detector sees a contact now, muted or not.
     pub contact: bool,
-    /// What is left of a mute \[s\]; 0 without one.
+    /// Remaining time of a mute \[s\]; 0 without one.
     pub muted_s: f64,
-    /// Time since a collision was latched, by a clock of the cell's computer that only runs \[ms\]: also while the
-    /// detectors are silent, until the latch is released. Left out where nothing is latched.
+    /// Time since a collision was latched, by a monotonic clock of the cell's computer \[ms\]. It increases until the
+    /// latch is released, also while the detectors are silent. Left out if nothing is latched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub latched_for_ms: Option<u64>,
-    /// The touched link; left out where there is none, or it is not known.
+    /// The touched link; left out if there is none, or if it is unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
     /// The estimated force on the robot, world frame \[N\].
@@ -39,7 +39,7 @@ pub struct AlarmMessage {
 }
 
 impl AlarmMessage {
-    /// Before anything was heard.
+    /// Returns the message before the first detection.
     pub fn silent() -> Self {
         Self {
             stamp_ns: 0,
@@ -54,11 +54,11 @@ impl AlarmMessage {
     }
 }
 
-/// Where the alarm stands.
+/// States of the alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AlarmState {
-    /// No sample came for too long, or the run has ended: stop.
+    /// No sample has arrived for too long, or the run has ended: stop.
     Silent,
     /// A detector cannot judge: stop.
     NotReady,
@@ -66,14 +66,14 @@ pub enum AlarmState {
     Free,
     /// Something touches it: stop, unless muted.
     Contact,
-    /// It has collided, and nobody has acknowledged that: stop.
+    /// It has collided, and the collision is not acknowledged: stop.
     Collision,
     /// The acknowledged collision is not over yet: stop.
     Acknowledged,
 }
 
 impl AlarmState {
-    /// Its number in a Modbus register.
+    /// Returns its number in a Modbus register.
     pub fn number(self) -> u16 {
         match self {
             Self::Silent => 0,
@@ -85,7 +85,7 @@ impl AlarmState {
         }
     }
 
-    /// In a word, as in JSON.
+    /// Returns its name in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Silent => "silent",
@@ -110,48 +110,48 @@ impl From<State> for AlarmState {
     }
 }
 
-/// Under `<cell>/detections/<detector>`: what a detector says of a sample.
+/// Under `<cell>/detections/<detector>`: the verdict of a detector on a sample.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct DetectionMessage {
     /// Stamp of the sample \[ns since the epoch\].
     pub stamp_ns: i64,
-    /// Its number in the detector's stream; a hole means loss.
+    /// Number of the sample in the detector's stream; a gap means loss.
     pub sequence: u64,
     /// The detector's name.
     pub detector: String,
-    /// What it says in its own words: `free`, `contact`, `collision`, ….
+    /// State in the detector's own terms: `free`, `contact`, `collision`, ….
     pub state: String,
     /// Whether it judged this sample.
     pub ready: bool,
     /// Whether it sees a contact, or a change of the arm.
     pub alarm: bool,
-    /// What begins or ends at this sample.
+    /// Begin or end of an alarm at this sample.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub event: Option<EventMessage>,
     /// The score, in the detector's own unit.
     pub score: f64,
-    /// The score from which on it raises an alarm.
+    /// Score from which the detector raises an alarm.
     pub threshold: f64,
     /// Estimated beginning of the contact, while an alarm lasts \[ns since the epoch\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact_ns: Option<i64>,
     /// The joints that detected.
     pub joints: Vec<String>,
-    /// The touched link, where it is estimated.
+    /// The touched link, if it is estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
-    /// The other link that it may as well be, where the first is not sure.
+    /// The alternative link, if the estimate is ambiguous.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other_link: Option<String>,
     /// Estimated force on the robot, world frame \[N\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_n: Option<[f64; 3]>,
-    /// Where the force is taken to act, world frame \[m\].
+    /// Assumed point of application of the force, world frame \[m\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub point_m: Option<[f64; 3]>,
 }
 
-/// What begins or ends at a sample.
+/// Begin or end of an alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EventMessage {
@@ -166,7 +166,7 @@ pub enum EventMessage {
 pub struct JointsMessage {
     /// Stamp of the sample \[ns since the epoch\].
     pub stamp_ns: i64,
-    /// Its number in the stream; a hole means loss.
+    /// Number of the sample in the stream; a gap means loss.
     pub sequence: u64,
     /// The joints, in URDF order.
     pub name: Vec<String>,
@@ -181,31 +181,31 @@ pub struct JointsMessage {
     pub effort: Vec<f64>,
 }
 
-/// Under `<cell>/command`: a command that was taken.
+/// Under `<cell>/command`: an accepted command.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CommandMessage {
-    /// Stamp of the first sample for which it holds \[ns since the epoch\].
+    /// Stamp of the sample from which it is in effect \[ns since the epoch\].
     pub stamp_ns: i64,
-    /// What was told.
+    /// Verb of the command.
     pub verb: String,
-    /// The numbers and texts that go with it.
+    /// Arguments of the command, by name.
     pub arguments: std::collections::BTreeMap<String, String>,
 }
 
-/// Under `<cell>/health/<stage>`: how a stage fares, once a second.
+/// Under `<cell>/health/<stage>`: the health of a stage, once a second.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct HealthMessage {
     /// Stamp of the stage's newest sample \[ns since the epoch\].
     pub stamp_ns: i64,
     /// The stage.
     pub stage: String,
-    /// Samples that came in.
+    /// Number of received samples.
     pub received: u64,
-    /// Samples that went out.
+    /// Number of emitted samples.
     pub emitted: u64,
-    /// Samples that were lost or refused.
+    /// Number of samples that were lost or refused.
     pub dropped: u64,
-    /// How often it was started again.
+    /// Number of restarts of the stage.
     pub restarts: u64,
 }
 
@@ -222,7 +222,7 @@ impl From<&Health> for HealthMessage {
     }
 }
 
-/// All messages, by the topic behind the cell's name. Only their schema is of use.
+/// All messages, by the topic after the cell's name. This type exists only for their schema.
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(title = "tauscope messages")]
 pub struct Messages {
@@ -238,12 +238,12 @@ pub struct Messages {
     pub health: HealthMessage,
     /// `<cell>/status`.
     pub status: StatusMessage,
-    /// What the query `<cell>/status?clock` is answered with.
+    /// Answer to the query `<cell>/status?clock`.
     pub clock: ClockMessage,
     /// `<cell>/records`.
     pub records: RecordMessage,
-    /// What `<cell>/commands` takes.
+    /// Request to `<cell>/commands`.
     pub commands: tauscope_bus::command::Request,
-    /// What it answers.
+    /// Answer to such a request.
     pub answer: tauscope_bus::command::Answer,
 }

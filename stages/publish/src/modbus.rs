@@ -1,7 +1,7 @@
 //! A Modbus TCP server for a PLC. Not a safety function.
 //!
-//! What is read is worked out when it is read: the age of the newest sample counts, so a pipeline that hangs reads as
-//! stop, and one that is dead breaks the connection.
+//! Values are computed when they are read, from the age of the newest sample: a hung pipeline reads as stop, and a
+//! dead one closes the connection.
 
 mod guard;
 pub mod registers;
@@ -26,25 +26,25 @@ use crate::status::Status;
 use guard::Guard;
 use registers::{Registers, Write};
 
-/// Clients at a time; a further one is turned away.
+/// Maximum number of clients; further ones are rejected.
 const MAX_CLIENTS: usize = 8;
-/// How long a write waits for the pipeline's answer: longer than a command waits for a sample, so that none holds after it
-/// was said to have failed.
+/// Timeout of a write for the pipeline's answer. It is longer than a command waits for a sample, so that no command
+/// takes effect after its write was reported as failed.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// A listener that failed is tried again after so long.
+/// Pause before a failed listener is retried.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
 
-/// What the server shows, newest wins. Clones are one.
+/// The newest status, which the server reads. Clones share it.
 #[derive(Debug, Clone)]
 pub struct Board(Arc<Mutex<Status>>);
 
 impl Board {
-    /// Shows `status` first.
+    /// Creates a board with a first status.
     pub fn new(status: Status) -> Self {
         Self(Arc::new(Mutex::new(status)))
     }
 
-    /// Shows `status` from now on.
+    /// Replaces the status.
     pub fn show(&self, status: &Status) {
         self.0
             .lock()
@@ -52,7 +52,7 @@ impl Board {
             .clone_from(status);
     }
 
-    /// What it shows.
+    /// Returns the status.
     pub fn read(&self) -> Status {
         self.0
             .lock()
@@ -61,22 +61,22 @@ impl Board {
     }
 }
 
-/// How commands reach the pipeline.
+/// Connection over which commands reach the pipeline.
 #[derive(Debug, Clone)]
 pub struct Commands {
-    /// Connected to where the cell's source takes commands.
+    /// Session that is connected to the command endpoints of the cell's source.
     pub session: zenoh::Session,
-    /// The cell.
+    /// Name of the cell.
     pub cell: String,
 }
 
-/// A server that runs as long as this lives.
+/// A server that runs until it is dropped.
 pub struct Modbus {
     address: SocketAddr,
     runtime: Option<Runtime>,
 }
 
-/// A command that waits for its answer is not waited for.
+/// Does not wait for commands without an answer.
 impl Drop for Modbus {
     fn drop(&mut self) {
         if let Some(runtime) = self.runtime.take() {
@@ -86,7 +86,7 @@ impl Drop for Modbus {
 }
 
 impl Modbus {
-    /// Listens where `config` says and shows what is on `board`. Writes are commands.
+    /// Listens at the address in `config` and serves the status on `board`. Writes become commands.
     ///
     /// # Errors
     /// If it cannot listen there.
@@ -96,7 +96,7 @@ impl Modbus {
         commands: Option<Commands>,
     ) -> Result<Self, PublishError> {
         let address = config.listen;
-        // The schema bounds it; a program that gives nonsense gets a client that may be silent for ever.
+        // The schema bounds it; an invalid value from a program disables the timeout.
         let idle = Duration::try_from_secs_f64(config.idle_s).unwrap_or(Duration::MAX);
         let failed = |source| PublishError::Modbus { address, source };
         let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -125,7 +125,7 @@ impl Modbus {
                         "Modbus client {from} is turned away: {MAX_CLIENTS} are served already"
                     );
                 }
-                // Answers are small and must not wait for more; where that cannot be, they do.
+                // Answers are small: Nagle's algorithm would delay them. A failure here only costs time.
                 let _ = stream.set_nodelay(true);
                 async move { Ok(client.map(|client| (client, Guard::new(stream, from, idle)))) }
             };
@@ -145,17 +145,17 @@ impl Modbus {
         })
     }
 
-    /// Where it listens.
+    /// Returns the address that it listens on.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 }
 
-/// What one client is served with.
+/// Service of one client.
 struct Client {
     board: Board,
     commands: Option<Commands>,
-    /// Its place among the clients, free again when it leaves.
+    /// Slot of the client, released when it disconnects.
     _permit: OwnedSemaphorePermit,
 }
 
@@ -207,7 +207,7 @@ impl Service for Client {
 }
 
 impl Client {
-    /// Asks the pipeline for what is written; `done` is the reply once it holds.
+    /// Sends the written command to the pipeline; `done` is the reply once it is accepted.
     fn write(&self, write: Result<Write, ExceptionCode>, done: Response) -> Reply {
         let commands = self.commands.clone();
         Box::pin(async move {

@@ -1,4 +1,4 @@
-//! What is published over Zenoh, topic by topic: as JSON, and as ROS 2 messages. Topics are described in
+//! Outputs over Zenoh by topic: as JSON, and as ROS 2 messages. The topics are described in
 //! `docs/publish.md`.
 
 use tauscope_archive::ros::{self, Bool, DiagnosticArray, Float64, Wrench, WrenchStamped};
@@ -15,7 +15,7 @@ use crate::message::{
 use crate::poses::Poses;
 use crate::ros2::{Ros2, ros_name};
 
-/// The cell's messages.
+/// Publisher of the cell's messages.
 pub(crate) struct Outputs {
     cell: String,
     joints: Vec<String>,
@@ -62,7 +62,7 @@ impl Outputs {
         })
     }
 
-    /// A measured state: JSON only, since ROS 2 has it from the robot.
+    /// Publishes a measured state: as JSON only, since ROS 2 has it from the robot.
     pub fn joint_state(&mut self, sample: &JointState) -> Result<(), PublishError> {
         let Some(json) = &mut self.json else {
             return Ok(());
@@ -83,7 +83,7 @@ impl Outputs {
         json.publish("joint_states", &message)
     }
 
-    /// The twin's effort and the residual.
+    /// Publishes the twin's effort and the residual.
     pub fn twin(&mut self, sample: &TwinState) -> Result<(), PublishError> {
         let count = self.joints.len();
         let both = [
@@ -121,7 +121,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// Where the alarm stands.
+    /// Publishes the state of the alarm.
     pub fn alarm(&mut self, alarm: &AlarmMessage) -> Result<(), PublishError> {
         if let Some(ros2) = &mut self.ros2 {
             ros2.publish("free", &Bool { data: alarm.free })?;
@@ -139,7 +139,7 @@ impl Outputs {
         }
     }
 
-    /// What a detector says; `news` where something begins, ends or changes.
+    /// Publishes a detection; `news` is whether something begins, ends or changes.
     pub fn detection(
         &mut self,
         detection: &Detection,
@@ -192,7 +192,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// A command that was taken.
+    /// Publishes an accepted command.
     pub fn command(&mut self, command: &CommandMessage) -> Result<(), PublishError> {
         if let Some(ros2) = &mut self.ros2 {
             let array = diagnostics::of_command(command, &self.cell);
@@ -204,7 +204,7 @@ impl Outputs {
         }
     }
 
-    /// How a stage fares.
+    /// Publishes the health of a stage.
     pub fn health(&mut self, health: &Health) -> Result<(), PublishError> {
         if let Some(ros2) = &mut self.ros2 {
             let array = diagnostics::of_health(health, &self.cell);

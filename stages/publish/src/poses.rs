@@ -1,4 +1,4 @@
-//! Where the links were at a sample, so that a force can be told in the frame of the link that is touched.
+//! Poses of the links at a sample, for the conversion of a force to the frame of the touched link.
 
 use std::collections::VecDeque;
 
@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use tauscope_bus::{Detection, JointArray};
 use tauscope_dynamics::{Data, Model, forward_kinematics, link_pose};
 
-/// Positions that are remembered: detections come this many samples behind the motion at most.
+/// Number of positions kept; a detection lags behind the motion by at most this many samples.
 const REMEMBERED: usize = 64;
 
 /// Force and moment in a link's frame.
@@ -26,7 +26,7 @@ pub struct Poses {
 }
 
 impl Poses {
-    /// Of this robot.
+    /// Creates the poses of this robot.
     pub fn new(model: Model) -> Self {
         Self {
             data: Data::new(&model),
@@ -35,12 +35,12 @@ impl Poses {
         }
     }
 
-    /// The number of the link in the order of the URDF, from 0.
+    /// Returns the index of the link in the order of the URDF, from 0.
     pub fn link(&self, name: &str) -> Option<usize> {
         self.model.link_index(name)
     }
 
-    /// The name of the root link, whose frame is the world's.
+    /// Returns the name of the root link, whose frame is the world's.
     pub fn root(&self) -> Option<&str> {
         let links = self.model.links();
         let root = links.iter().find(|link| link.parent.is_none())?;
@@ -55,7 +55,8 @@ impl Poses {
         self.positions.push_back((stamp_ns, *position));
     }
 
-    /// The force of a detection, in the frame of the link that it names; `None` where link or position are not known.
+    /// Returns the force of a detection in the frame of the link that it names; `None` if link or position are
+    /// unknown.
     pub fn at_link(&mut self, detection: &Detection) -> Option<LinkWrench> {
         let link = self.link(detection.link.as_str())?;
         let stamp_ns = detection.header.stamp_ns;

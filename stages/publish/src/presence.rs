@@ -2,9 +2,9 @@
 //!
 //! | key | what |
 //! | --- | --- |
-//! | `<cell>/@alive/<instance>` | liveliness token: gone as soon as the process is |
-//! | `<cell>/status` | [`StatusMessage`] once a second; a query is answered with the newest, one with `clock` with a [`ClockMessage`] |
-//! | `<cell>/records` | [`RecordMessage`] as it comes; a query with `after=NUMBER` is answered with those behind it |
+//! | `<cell>/@alive/<instance>` | liveliness token, which disappears with the process |
+//! | `<cell>/status` | [`StatusMessage`] once a second; a query returns the newest, with `clock` a [`ClockMessage`] |
+//! | `<cell>/records` | [`RecordMessage`] as it occurs; a query with `after=NUMBER` returns those after that number |
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -20,10 +20,10 @@ use zenoh::{Session, Wait as _};
 use crate::error::PublishError;
 use crate::message::{ClockMessage, RecordMessage, StatusMessage};
 
-/// Records that are kept for who missed them. Resolution: hours of contacts, and an answer below 100 kB.
+/// Number of records kept for queries. Resolution: hours of contacts, and an answer below 100 kB.
 const MAX_RECORDS: usize = 256;
 
-/// The key under which a cell's life is told.
+/// Returns the key of a cell's liveliness token.
 pub fn alive_key(cell: &str, instance: &str) -> String {
     format!("{cell}/@alive/{instance}")
 }
@@ -42,15 +42,15 @@ pub struct Presence {
     kept: Arc<Mutex<Kept>>,
     _queryables: [Queryable<()>; 2],
     _token: LivelinessToken,
-    /// It closes when nobody holds it.
+    /// Keeps the session open.
     _session: Session,
 }
 
 impl Presence {
-    /// Announces the life `instance` of a publisher of `cell`.
+    /// Announces the run `instance` of a publisher of `cell`.
     ///
     /// # Errors
-    /// If Zenoh takes a key for none.
+    /// If Zenoh rejects a key.
     pub fn open(session: &Session, cell: &str, instance: &str) -> Result<Self, PublishError> {
         let kept = Arc::new(Mutex::new(Kept::default()));
         let (status, records) = (format!("{cell}/status"), format!("{cell}/records"));
@@ -74,7 +74,7 @@ impl Presence {
                         text(&lock(&kept), &query)
                     };
                     if let Some(text) = text {
-                        // Who has asked may be gone.
+                        // Fails if the client has disconnected.
                         let _ = query
                             .reply(own.clone(), text)
                             .encoding(Encoding::APPLICATION_JSON)
@@ -101,7 +101,7 @@ impl Presence {
         })
     }
 
-    /// Tells how the cell fares.
+    /// Publishes the status of the cell.
     ///
     /// # Errors
     /// If the message cannot be sent.
@@ -111,7 +111,7 @@ impl Presence {
         self.status.put(text).wait().map_err(PublishError::zenoh)
     }
 
-    /// Tells a record.
+    /// Publishes a record.
     ///
     /// # Errors
     /// If the message cannot be sent; it is kept for a query nevertheless.
@@ -128,7 +128,7 @@ impl Presence {
     }
 }
 
-/// By the clock of this computer \[ns since the epoch\].
+/// Returns the time by the clock of this computer \[ns since the epoch\].
 pub fn now_ns() -> i64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(0, |since| {
@@ -136,7 +136,7 @@ pub fn now_ns() -> i64 {
     })
 }
 
-/// What the clock says now.
+/// Returns the answer to a query of the clock.
 fn clock(instance: &str) -> Option<String> {
     let received_ns = now_ns();
     let message = ClockMessage {
@@ -147,7 +147,7 @@ fn clock(instance: &str) -> Option<String> {
     serde_json::to_string(&message).ok()
 }
 
-/// The records behind the number that a query names, as a JSON array.
+/// Returns the records after the number that a query names, as a JSON array.
 fn behind(kept: &Kept, query: &Query) -> String {
     let after: u64 = query
         .parameters()
@@ -159,7 +159,7 @@ fn behind(kept: &Kept, query: &Query) -> String {
     format!("[{}]", texts.join(","))
 }
 
-/// Each of its values is whole at any time, so a panic elsewhere does not matter.
+/// Locks the messages, even if poisoned: each of them is consistent at any time.
 fn lock(kept: &Mutex<Kept>) -> MutexGuard<'_, Kept> {
     kept.lock().unwrap_or_else(PoisonError::into_inner)
 }

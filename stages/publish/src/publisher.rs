@@ -1,8 +1,8 @@
-//! The publisher as a stage: samples go in, and the cell is told.
+//! The publisher as a stage: it receives samples and updates the outputs of the cell.
 //!
-//! It waits for nobody. Zenoh drops what a listener does not take; a Modbus client reads the newest. What the publisher
-//! itself has no time for gives way in its link, which counts it. The alarm's time is that of the samples; only the
-//! watch over silence has a clock.
+//! It never waits for a client. Zenoh drops messages that a subscriber is too slow for; a Modbus client reads the
+//! newest status. Samples for which the publisher has no time are dropped by its link, which counts them. The alarm's
+//! time is that of the samples; only the detection of silence uses a clock.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -25,23 +25,23 @@ use crate::session::session;
 use crate::setup::{Setup, StreamInfo};
 use crate::status::Status;
 
-/// While nothing changes the alarm is told this often, in time of the samples \[ns\].
+/// Repetition interval of an unchanged alarm, in time of the samples \[ns\].
 const REPEAT_NS: u64 = 100_000_000;
-/// And in time of the clock, while nothing comes.
+/// Repetition interval of an unchanged alarm in real time, while no sample arrives.
 const REPEAT: Duration = Duration::from_millis(100);
 
 /// A stream of detections.
 struct Detector {
     stage: String,
-    /// What tells it from the others: the detector's name, or the stage's where two run the same.
+    /// Unique label: the detector's name, or the stage's name if several stages run the same detector.
     label: String,
-    /// Its place in the alarm.
+    /// Its index in the alarm.
     in_alarm: Option<usize>,
     before: Option<Detection>,
     heard: Option<Instant>,
 }
 
-/// Tells the cell what the detectors find. Not a safety function.
+/// Publishes the findings of the detectors to the cell. Not a safety function.
 pub struct Publisher {
     cell: String,
     detectors: Vec<Detector>,
@@ -53,17 +53,17 @@ pub struct Publisher {
     board: Board,
     modbus: Option<Modbus>,
     shown: Option<(AlarmMessage, Instant)>,
-    /// Messages that could not be published.
+    /// Number of messages that could not be published.
     unsent: u64,
-    /// A stage before it has failed.
+    /// Whether an upstream stage has failed.
     cut_short: bool,
 }
 
 impl Publisher {
-    /// Opens all that `config` asks for.
+    /// Opens the outputs in `config`.
     ///
     /// # Errors
-    /// If configuration and streams do not fit together, or Zenoh or Modbus cannot be opened.
+    /// If configuration and streams do not match, or Zenoh or Modbus cannot be opened.
     pub fn new(config: &Config, setup: &Setup) -> Result<Self, PublishError> {
         config.check()?;
         let mut judges = 0;
@@ -142,7 +142,7 @@ impl Publisher {
         })
     }
 
-    /// Where the Modbus server listens.
+    /// Returns the address that the Modbus server listens on.
     pub fn modbus_address(&self) -> Option<std::net::SocketAddr> {
         self.modbus.as_ref().map(Modbus::address)
     }
@@ -185,7 +185,7 @@ impl Publisher {
             self.alarm.detection(place, detection);
             self.status.detections += 1;
         }
-        // First what the robot is to do, then what people want to know.
+        // The alarm first, since the robot reacts to it; the rest is information for people.
         self.show();
         let label = self.detectors[index].label.clone();
         let judges = self.detectors[index].in_alarm.is_some();
@@ -203,7 +203,7 @@ impl Publisher {
         self.tell(|outputs, _| outputs.health(health));
     }
 
-    /// Brings what is shown up to date.
+    /// Updates the status, and publishes the alarm if needed.
     fn show(&mut self) {
         let judges = self.detectors.iter().filter(|each| each.in_alarm.is_some());
         let heard: Option<Vec<Instant>> = judges.clone().map(|each| each.heard).collect();
@@ -230,7 +230,7 @@ impl Publisher {
         self.announce(Instant::now());
     }
 
-    /// Tells the alarm, if it has changed or was told too long ago.
+    /// Publishes the alarm if it has changed, or if its last message is too old.
     fn announce(&mut self, now: Instant) {
         let alarm = self.status.at(now);
         let old = self.shown.as_ref().is_none_or(|(shown, since)| {
@@ -256,7 +256,7 @@ impl Publisher {
         }
     }
 
-    /// Publishes, where somebody is told. What cannot be published is counted; the first time is told of.
+    /// Publishes over Zenoh, if configured. Failures are counted, and the first one is logged.
     fn tell(
         &mut self,
         publish: impl FnOnce(&mut Outputs, Option<&mut Poses>) -> Result<(), PublishError>,
@@ -268,7 +268,7 @@ impl Publisher {
         self.note(told);
     }
 
-    /// Tells the fleet what is new.
+    /// Reports news and the status to the fleet.
     fn tell_fleet(&mut self, now: Instant, ended: bool) {
         let Some(fleet) = &mut self.fleet else {
             return;
@@ -303,7 +303,7 @@ impl Sink for Publisher {
             }
             SampleRef::Health(health) => self.health(health),
         }
-        // A detector may be silent while others speak.
+        // A detector may be silent while others send samples.
         let now = Instant::now();
         self.announce(now);
         self.tell_fleet(now, false);
@@ -322,7 +322,7 @@ impl Sink for Publisher {
     }
 
     fn finish(&mut self) -> Result<(), StageError> {
-        // The run is over: nothing is known from here on.
+        // The run is over: the state of the robot is unknown from here on.
         self.status.heard = None;
         self.board.show(&self.status);
         self.shown = None;
@@ -337,7 +337,8 @@ impl Sink for Publisher {
     }
 }
 
-/// The alarm of so many detectors, and what is shown before anything is heard: a latch of an earlier life holds already.
+/// Creates the alarm of `judges` detectors, and the status before the first detection, with the latch after a
+/// restart.
 fn before_all(config: &Config, judges: usize, restarted: bool) -> (Alarm, Status) {
     let alarm = Alarm::new(config.latch, judges, restarted);
     let mut status = Status::silent(Duration::from_secs_f64(config.stop_after_s));
@@ -346,7 +347,7 @@ fn before_all(config: &Config, judges: usize, restarted: bool) -> (Alarm, Status
     (alarm, status)
 }
 
-/// Where the alarm stands, without what is touched.
+/// Returns the message of the alarm, without the touched link and the force.
 fn of_alarm(alarm: &Alarm) -> AlarmMessage {
     AlarmMessage {
         stamp_ns: alarm.now_ns(),

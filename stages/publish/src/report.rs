@@ -1,4 +1,4 @@
-//! What a cell's fleet is told: a pure state machine over samples. Time is that of the samples.
+//! The report of a cell to its fleet: a pure state machine over samples. Time is that of the samples.
 
 mod residual;
 
@@ -11,7 +11,7 @@ use crate::message::{ChangeMessage, ContactMessage, HealthMessage, Record};
 pub use residual::Residual;
 
 const DAY_NS: i64 = 86_400_000_000_000;
-/// Stages whose health is kept. Resolution: a cell has fewer than ten.
+/// Maximum number of stages whose health is kept. Resolution: a cell has fewer than ten.
 const MAX_STAGES: usize = 64;
 
 /// Contacts, changes and health of one cell.
@@ -19,7 +19,7 @@ const MAX_STAGES: usize = 64;
 pub struct Report {
     joints: Vec<String>,
     followers: Vec<ContactFollower>,
-    /// The detector whose contact lasts.
+    /// The detector of the contact in progress.
     open: Option<usize>,
     last: Option<ContactMessage>,
     contacts: u64,
@@ -27,12 +27,12 @@ pub struct Report {
     today_since_ns: i64,
     changes: BTreeMap<usize, ChangeMessage>,
     health: BTreeMap<String, HealthMessage>,
-    /// What is new and not yet told.
+    /// Records that are not sent yet.
     news: Vec<Record>,
 }
 
 impl Report {
-    /// Of a cell with these joints and so many streams of detections.
+    /// Creates the report of a cell with these joints and this number of detection streams.
     pub fn new(joints: Vec<String>, detectors: usize) -> Self {
         Self {
             joints,
@@ -48,40 +48,40 @@ impl Report {
         }
     }
 
-    /// The newest contact.
+    /// Returns the newest contact.
     pub fn last(&self) -> Option<&ContactMessage> {
         self.last.as_ref()
     }
 
-    /// Contacts since midnight (UTC) or the first sample, and since when \[ns since the epoch\].
+    /// Returns the number of contacts since midnight (UTC) or the first sample, and that time \[ns since the epoch\].
     pub fn today(&self) -> (u64, i64) {
         (self.today, self.today_since_ns)
     }
 
-    /// The changes that are reported now.
+    /// Returns the changes that are reported now.
     pub fn changes(&self) -> Vec<ChangeMessage> {
         self.changes.values().cloned().collect()
     }
 
-    /// The newest health of each stage.
+    /// Returns the newest health of each stage.
     pub fn health(&self) -> Vec<HealthMessage> {
         self.health.values().cloned().collect()
     }
 
-    /// What is new since it was asked last.
+    /// Removes and returns the records that are not sent yet.
     pub fn news(&mut self) -> Vec<Record> {
         std::mem::take(&mut self.news)
     }
 
-    /// Takes how a stage fares.
+    /// Takes the health of a stage.
     pub fn take_health(&mut self, health: HealthMessage) {
         if self.health.len() < MAX_STAGES || self.health.contains_key(&health.stage) {
             self.health.insert(health.stage.clone(), health);
         }
     }
 
-    /// Takes what detector number `at` says of a sample; `label` is its name. `judges`: it tells of contacts, and the
-    /// alarm stands at `alarm` now.
+    /// Takes a detection of detector number `at`, called `label`. `judges`: whether it reports contacts. `alarm`: the
+    /// current state of the alarm.
     pub fn detection(
         &mut self,
         at: usize,
@@ -138,7 +138,7 @@ impl Report {
         self.revise(&contact, None);
     }
 
-    /// Brings the newest contact up to date and tells it.
+    /// Updates the newest contact and adds a record of it.
     fn revise(&mut self, contact: &tauscope_bus::Contact, end_ns: Option<i64>) {
         let Some(last) = &mut self.last else { return };
         let told = |link: &Name| Some(link.to_string()).filter(|link| !link.is_empty());
@@ -175,7 +175,7 @@ impl Report {
         self.news.push(Record::Change(change));
     }
 
-    /// Takes a command that holds from `stamp_ns` on.
+    /// Takes a command that is in effect from `stamp_ns` on.
     pub fn command(&mut self, stamp_ns: i64, command: &Command) {
         let acknowledges = command.verb() == Some(Verb::Acknowledge);
         let open = |last: &&mut ContactMessage| last.acknowledged_ns.is_none();

@@ -27,7 +27,7 @@ pub struct Ros2 {
     session: Session,
     domain: u32,
     namespace: String,
-    /// Told of as long as this lives.
+    /// Liveliness token of the node.
     _node: LivelinessToken,
     topics: BTreeMap<String, Topic>,
     body: Vec<u8>,
@@ -41,10 +41,10 @@ struct Topic {
 }
 
 impl Ros2 {
-    /// A node in the namespace of `cell`.
+    /// Opens a node in the namespace of `cell`.
     ///
     /// # Errors
-    /// If Zenoh does not take its token.
+    /// If Zenoh rejects its token.
     pub fn open(session: &Session, config: &Ros2Config, cell: &str) -> Result<Self, PublishError> {
         let namespace = config.namespace.as_deref().unwrap_or(cell);
         let namespace = ros_name(namespace.trim_matches('/'));
@@ -62,12 +62,12 @@ impl Ros2 {
     /// Announces a topic, below the namespace, before the first message.
     ///
     /// # Errors
-    /// If Zenoh does not take its key.
+    /// If Zenoh rejects its key.
     pub fn announce<M: Message>(&mut self, topic: &str) -> Result<(), PublishError> {
         self.topic::<M>(topic).map(|_| ())
     }
 
-    /// Publishes a message; whoever does not take it loses it, as the hole in the numbers shows.
+    /// Publishes a message without waiting; a subscriber that is too slow loses it, and sees a gap in the sequence.
     ///
     /// # Errors
     /// If the message or its key cannot be written.

@@ -6,9 +6,9 @@ use zenoh::Session;
 use crate::config::{Config, ZenohConfig};
 use crate::setup::Setup;
 
-/// The session over which all is published, if anything is.
+/// Opens the session over which the publisher sends messages and commands, if it has endpoints.
 pub(crate) fn session(config: &Config, setup: &Setup) -> Result<Option<Session>, LinkError> {
-    // ROS 2 and users of JSON may be peers behind the same router, which hear routers alone.
+    // Subscribers of ROS 2 and JSON may be peers behind the same router, and such peers receive from routers only.
     let has_topics = |zenoh: &ZenohConfig| zenoh.json || zenoh.ros2.is_some();
     let open = if config.zenoh.as_ref().is_some_and(has_topics) {
         ZenohEndpoints::session
@@ -18,7 +18,7 @@ pub(crate) fn session(config: &Config, setup: &Setup) -> Result<Option<Session>,
     endpoints(config, setup).map(|at| open(&at)).transpose()
 }
 
-/// Where its session goes: to the listeners, and to where the source takes commands.
+/// Returns the endpoints of the session: those in the configuration, and those at which the source accepts commands.
 fn endpoints(config: &Config, setup: &Setup) -> Option<ZenohEndpoints> {
     let zenoh = config.zenoh.as_ref().map(|zenoh| ZenohEndpoints {
         listen: zenoh.listen.clone(),

@@ -1,44 +1,45 @@
-//! What a publisher must know of its cell.
+//! Facts of a cell that its publisher needs.
 
 use tauscope_bus::{SampleKind, ZenohEndpoints};
 use tauscope_dynamics::Model;
 
 use crate::fleet::Facts;
 
-/// What a publisher must know of its cell.
+/// Facts of a cell that its publisher needs.
 #[derive(Debug, Clone)]
 pub struct Setup {
-    /// The cell's name.
+    /// Name of the cell.
     pub cell: String,
-    /// Its joints, in URDF order.
+    /// Joints of the cell, in URDF order.
     pub joint_names: Vec<String>,
-    /// Its robot, where there is one: for forces at links.
+    /// Model of the robot, if there is one: for forces at links.
     pub model: Option<Model>,
-    /// The streams that it listens to.
+    /// Input streams of the publisher.
     pub streams: Vec<StreamInfo>,
-    /// Where the cell's source takes commands, if it does.
+    /// Endpoints at which the cell's source accepts commands, if it does.
     pub commands: Option<ZenohEndpoints>,
-    /// What its fleet is told of it.
+    /// Facts that are reported to the fleet.
     pub facts: Facts,
-    /// Whether this stage has been started again: what was latched is not known then.
+    /// Whether this stage was restarted, so that the earlier latch is unknown.
     pub restarted: bool,
 }
 
-/// A stream that a publisher listens to.
+/// An input stream of a publisher.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StreamInfo {
     /// The stage it comes from.
     pub stage: String,
-    /// What it carries.
+    /// Kind of its samples.
     pub kind: SampleKind,
-    /// The detector that speaks in it, where that is known.
+    /// The detector that sends it, if known.
     pub detector: Option<String>,
-    /// Whether it says whether something touches the robot; a watch over the twin does not.
+    /// Whether it reports contacts; a watch over the twin does not.
     pub judges_contact: bool,
 }
 
 impl StreamInfo {
-    /// What tells it from the others of `all`: the detector's name, or the stage's where two run the same.
+    /// Returns its unique label among `all`: the detector's name, or the stage's name if several stages run the same
+    /// detector.
     pub(crate) fn label(&self, all: &[Self]) -> String {
         let same = |detector: &String| {
             let all = all

@@ -1,28 +1,28 @@
-//! What the outputs show: the alarm, and how old it is.
+//! Status on the outputs: the alarm and its age.
 
 use std::time::{Duration, Instant};
 
 use crate::alarm::State;
 use crate::message::{AlarmMessage, AlarmState};
 
-/// The alarm at the newest detection, and when that came.
+/// The alarm at the newest detection, and the arrival time of the detections.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Status {
-    /// As of the newest detection.
+    /// The alarm at the newest detection.
     pub alarm: AlarmMessage,
     /// The touched link in the order of the URDF, from 1; 0 for none.
     pub link_number: u16,
-    /// Detections so far.
+    /// Number of detections so far.
     pub detections: u64,
-    /// When the detector that was heard longest ago was heard; `None` before each has been.
+    /// Last arrival from the detector that has been silent longest; `None` before each detector has sent a detection.
     pub heard: Option<Instant>,
-    /// Since when a collision is latched, acknowledged or not.
+    /// Time at which the current collision was latched, acknowledged or not.
     latched: Option<Instant>,
     stop_after: Duration,
 }
 
 impl Status {
-    /// Before anything was heard.
+    /// Creates the status before the first detection.
     pub fn silent(stop_after: Duration) -> Self {
         Self {
             alarm: AlarmMessage::silent(),
@@ -34,12 +34,12 @@ impl Status {
         }
     }
 
-    /// How old it is; `None` before each detector was heard.
+    /// Returns the age of the alarm; `None` before each detector has sent a detection.
     pub fn age(&self, now: Instant) -> Option<Duration> {
         self.heard.map(|heard| now.saturating_duration_since(heard))
     }
 
-    /// Notes that the alarm stands at `state` from `now` on. A collision behind an acknowledged one is another latch.
+    /// Records the state of the alarm at `now`. A collision after an acknowledged one is a new latch.
     pub fn latch(&mut self, state: State, now: Instant) {
         let is_new = state == State::Collision && self.alarm.state == AlarmState::Acknowledged;
         let is_latched = matches!(state, State::Collision | State::Acknowledged);
@@ -47,7 +47,7 @@ impl Status {
         self.latched = is_latched.then(|| before.unwrap_or(now));
     }
 
-    /// What it says at the instant `now`: when it is too old, that nothing is known but a latch, which stays.
+    /// Returns the alarm at the instant `now`. If it is too old, its state is silent and not free; a latch remains.
     pub fn at(&self, now: Instant) -> AlarmMessage {
         let is_fresh = self.age(now).is_some_and(|age| age <= self.stop_after);
         let latched = self

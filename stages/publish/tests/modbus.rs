@@ -1,5 +1,5 @@
-//! What a PLC reads and writes, with a real client.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+//! Reads and writes of a PLC, with a real client.
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 mod common;
 
@@ -93,7 +93,7 @@ async fn clients_that_say_nothing_any_more_give_their_places_up() {
     let mut late = client(address).await;
     let turned_away = late.read_coils(0, BITS).await;
     assert!(turned_away.is_err(), "{turned_away:?}");
-    // One goes on asking, seven are gone without a word.
+    // One client continues to poll; seven fall silent without disconnecting.
     for _ in 0..15 {
         tokio::time::sleep(Duration::from_millis(200)).await;
         all[0].read_coils(0, BITS).await.unwrap().unwrap();
@@ -112,7 +112,7 @@ async fn a_plc_acknowledges_and_mutes() {
     let source = Answering::at(&endpoint, &Answer::Taken { stamp_ns: 5 });
     let publisher = publisher(&format!("{{{ANY_PORT}}}"), Some(&endpoint));
     let mut plc = client(publisher.modbus_address().unwrap()).await;
-    // The sessions may still be on their way to each other.
+    // The sessions may still be connecting.
     let mut taken = plc.write_single_coil(ACKNOWLEDGE, true).await.unwrap();
     for _ in 0..20 {
         if taken.is_ok() {

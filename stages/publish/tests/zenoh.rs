@@ -1,4 +1,4 @@
-//! What a listener on Zenoh is told: ROS 2 messages as `rmw_zenoh` has them, and JSON.
+//! Messages to a subscriber on Zenoh: ROS 2 as `rmw_zenoh` sends it, and JSON.
 #![allow(
     clippy::unwrap_used,
     clippy::float_cmp,
@@ -42,17 +42,17 @@ fn ros_key<M: Message>(topic: &str) -> String {
     format!("7/press_1/{topic}/{}/{}", M::dds_type(), M::TYPE_HASH)
 }
 
-/// Everything that was said on a topic.
+/// Returns all messages received on a topic.
 fn said<M: Message>(heard: &Heard, topic: &str) -> Vec<M> {
     let heard = heard.lock().unwrap();
     let bodies = heard.get(&ros_key::<M>(topic)).into_iter().flatten();
     bodies.map(|(body, _)| ros::decode(body).unwrap()).collect()
 }
 
-/// Rounds in which no further topic is heard: zenoh matches each topic by itself.
+/// Number of rounds without a further topic after which all are matched: zenoh matches each topic by itself.
 const SETTLED_ROUNDS: u32 = 30;
 
-/// A publisher that somebody hears on all its topics, which has said that nothing touches the robot.
+/// Returns a publisher in the state free, with a subscriber matched on all its topics.
 fn heard_publisher(key: &str) -> (Publisher, Session, Heard) {
     let endpoint = endpoint();
     let mut publisher = publisher(
@@ -87,7 +87,7 @@ fn ros_2_hears_a_contact() {
         let said: Vec<bool> = free.iter().map(|free| free.data).collect();
         said.windows(3).any(|three| three == [true, false, true])
     });
-    // Each topic comes in its own time; what is asked below has come then.
+    // Topics arrive in any order; once this one is here, those checked below are too.
     until("diagnosed", || {
         let all: Vec<ros::DiagnosticArray> = said(&heard, "diagnostics");
         let words = |array: &ros::DiagnosticArray| array.status[0].message == "contact";
@@ -241,7 +241,7 @@ fn silence_reads_as_stop() {
         feed(&mut publisher, &says(ms, "free"));
         newest().is_some_and(|alarm| alarm["free"] == true)
     });
-    // No sample any more, only the idle ticks of the shell.
+    // No further sample, only the idle calls of the shell.
     std::thread::sleep(Duration::from_millis(350));
     until("silent", || {
         publisher.idle().unwrap();

@@ -1,5 +1,4 @@
-//! The archive: what is kept of the streams as MCAP, in messages that any ROS 2 tool reads. Topic by
-//! topic it is described in `docs/archive.md`.
+//! The MCAP archive of the streams, in messages that any ROS 2 tool reads. `docs/archive.md` describes its topics.
 
 mod command;
 mod detections;
@@ -22,20 +21,20 @@ use crate::contacts::Told;
 use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
 
-/// A disk that takes longer to sync than this is told of.
+/// Sync duration above which a slow disk is reported.
 /// Resolution: ten chunks.
 const SLOW_DISK: Duration = Duration::from_secs(1);
 
 /// An archive that is being written.
 pub(crate) struct Archive {
     file: File,
-    /// By stream.
+    /// Topics by stream.
     topics: Vec<Topics>,
-    /// By cell; made when the first report comes.
+    /// Diagnostics topic by cell; created with the first report.
     diagnostics: Vec<Option<TopicWriter<DiagnosticArray>>>,
 }
 
-/// What a stream writes to.
+/// Topics of a stream.
 enum Topics {
     JointState {
         state: JointTopic,
@@ -49,7 +48,7 @@ enum Topics {
     Health,
 }
 
-/// The file, with the times that a sample's header gives.
+/// The file; messages get the times of the sample's header.
 pub(crate) struct File {
     writer: McapWriter,
 }
@@ -69,7 +68,7 @@ impl File {
             .write(topic, header.received_ns, header.stamp_ns, message)
     }
 
-    /// Writes to a topic that is made at the first message.
+    /// Writes to a topic that is created with the first message.
     fn write_late<M: ros::Message>(
         &mut self,
         topic: &mut Option<TopicWriter<M>>,
@@ -86,7 +85,7 @@ impl File {
 }
 
 impl Archive {
-    /// Begins the file with the topics that are known by now.
+    /// Creates the file with the topics that are known in advance.
     pub fn create(
         path: &Path,
         config: &Config,
@@ -101,7 +100,7 @@ impl Archive {
         }
         if let Some(aside) = writer.set_aside() {
             let aside = aside.display();
-            tracing::warn!("an unfinished archive of a run before was kept as {aside}");
+            tracing::warn!("an unfinished archive of an earlier run was kept as {aside}");
         }
         let mut file = File { writer };
         let mut topics = Vec::new();
@@ -123,7 +122,7 @@ impl Archive {
         })
     }
 
-    /// Takes a sample of the stream number `index`.
+    /// Writes a sample of the stream number `index`.
     pub fn accept(
         &mut self,
         streams: &Streams,
@@ -163,7 +162,7 @@ impl Archive {
             (SampleRef::Detection(detection), Topics::Detection(topics)) => {
                 topics.write(&mut self.file, streams, stream, (detection, told))?;
             }
-            // `Streams::find` lets only samples of the announced type through.
+            // `Streams::find` passes samples of the announced type only.
             _ => {}
         }
         Ok(())
@@ -209,28 +208,28 @@ impl Archive {
         )
     }
 
-    /// Hands all to the operating system.
+    /// Flushes all data to the operating system.
     pub fn flush(&mut self) -> Result<(), RecordError> {
         Ok(self.file.writer.flush()?)
     }
 
-    /// Length of the file when its last chunk was closed \[bytes\].
+    /// Length of the file up to the last closed chunk \[bytes\].
     pub fn bytes(&self) -> u64 {
         self.file.writer.bytes()
     }
 
-    /// What the index at its end will take \[bytes\].
+    /// Size of the index at the end of the file \[bytes\].
     pub fn index_bytes(&self) -> u64 {
         self.file.writer.index_bytes()
     }
 
-    /// Completes the file and gives it its name, which is told.
+    /// Completes and renames the file; returns its path.
     pub fn finish(self) -> Result<PathBuf, RecordError> {
         let slowest = self.file.writer.slowest_sync();
         if slowest > SLOW_DISK {
             let slowest_s = slowest.as_secs_f64();
             tracing::warn!(
-                "the disk took up to {slowest_s:.1} s to sync: a power cut would have cost as much"
+                "the disk took up to {slowest_s:.1} s to sync: a power failure could have lost as much data"
             );
         }
         Ok(self.file.writer.finish()?.path)

@@ -1,9 +1,9 @@
-//! Files around alarms: what came before an alarm waits in memory.
+//! Files around alarms, with the samples before each alarm buffered in memory.
 //!
-//! Samples wait in a ring. An alarm opens files, into which the ring is emptied a few samples at a time,
-//! so that no sample has to wait while thousands are written. The files stay open until no alarm could
-//! come any more whose time before it reaches back into them. All times are the samples' own. Where the
-//! clock of reception is set back, other files begin.
+//! Samples are buffered in a ring. An alarm opens files, into which the ring is written a few samples at a time, so
+//! that no new sample waits while thousands are written. The files stay open until the interval before a further
+//! alarm could no longer overlap them. All times come from the samples. If the reception clock is set back, new files
+//! are begun.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
@@ -17,8 +17,8 @@ use crate::files::Files;
 use crate::set_back::SetBack;
 use crate::streams::Streams;
 
-/// Samples that are written for each that comes, while there are any to be.
-/// Resolution: how long a sample waits, against how long the ring stays full.
+/// Largest number of buffered samples that are written per received sample.
+/// Resolution: delay of a received sample, against the time to empty the ring.
 const WRITTEN_PER_SAMPLE: usize = 8;
 
 /// Files around alarms.
@@ -30,27 +30,27 @@ pub(crate) struct AroundAlarms {
     most_bytes: usize,
     before_ns: i64,
     after_ns: i64,
-    /// Up to which time files are to hold all, while they are open.
+    /// Time up to which the open files record all samples.
     until_ns: Option<i64>,
     clock: SetBack,
-    /// How often the clock of reception was set back: by now, and before the samples of the open files.
+    /// Number of times that the reception clock was set back: so far, and up to the last written sample.
     set_back: u64,
     written_set_back: u64,
-    /// The ring was too small, and that was said.
+    /// Whether a too small ring was already reported.
     told: bool,
 }
 
-/// A sample that waits, with its stream's number.
+/// A buffered sample, with its stream's number.
 struct Waiting {
     index: usize,
-    /// By the clock of reception as it stands now \[ns since the epoch\].
+    /// Reception time by the current setting of the clock \[ns since the epoch\].
     received_ns: i64,
-    /// How often that clock had been set back when the sample was received.
+    /// Number of times that the clock had been set back at reception.
     set_back: u64,
     sample: Sample,
 }
 
-/// A sample of the ring's own.
+/// An owned copy of a sample.
 enum Sample {
     JointState(Box<JointState>),
     TwinState(Box<TwinState>),
@@ -79,7 +79,7 @@ impl Sample {
 }
 
 impl Waiting {
-    /// What it takes in memory \[bytes\].
+    /// Memory use \[bytes\].
     fn bytes(&self) -> usize {
         size_of::<Self>()
             + match self.sample {
@@ -116,7 +116,7 @@ impl AroundAlarms {
         })
     }
 
-    /// Takes a sample of the stream number `index`.
+    /// Buffers a sample of the stream number `index`, and writes buffered samples that belong to open files.
     pub fn accept(
         &mut self,
         streams: &Streams,
@@ -151,7 +151,7 @@ impl AroundAlarms {
         self.forget(streams, oldest_ns)
     }
 
-    /// The clock of reception was set back: what waits was received as long ago as before, by the new time.
+    /// Shifts the times of buffered samples after the reception clock was set back, so that their age is unchanged.
     fn set_back(&mut self, by_ns: i64) {
         self.set_back += 1;
         for waiting in &mut self.ring {
@@ -162,7 +162,7 @@ impl AroundAlarms {
         }
     }
 
-    /// Gives up what is older than an alarm that comes now would ask for, or what there is no memory for.
+    /// Removes samples that are older than an alarm now would need, or that exceed the memory limit.
     fn forget(&mut self, streams: &Streams, oldest_ns: i64) -> Result<(), RecordError> {
         while let Some(first) = self.ring.front() {
             let too_much = self.bytes > self.most_bytes;
@@ -178,7 +178,7 @@ impl AroundAlarms {
                 continue;
             }
             if self.until_ns.is_some() {
-                // What is given up now would be missing in the middle if the files were gone on with.
+                // The removed sample would leave a gap in the open files.
                 self.close(streams)?;
             }
             if let Some(waiting) = self.pop() {
@@ -189,7 +189,7 @@ impl AroundAlarms {
         Ok(())
     }
 
-    /// Writes the sample that waits longest, if it belongs to files that are open.
+    /// Writes the oldest buffered sample, if it belongs to the open files.
     fn write_next(&mut self, streams: &Streams) -> Result<bool, RecordError> {
         let belongs = |first: &Waiting| {
             self.until_ns
@@ -202,7 +202,7 @@ impl AroundAlarms {
             return Ok(false);
         };
         if std::mem::replace(&mut self.written_set_back, waiting.set_back) != waiting.set_back {
-            // A file is read in the order of reception: what came behind would come first.
+            // Files are read in the order of reception times, so samples after the clock step would be sorted first.
             self.files.finish(streams)?;
         }
         let sample = waiting.sample.as_ref();
@@ -217,30 +217,30 @@ impl AroundAlarms {
         Some(waiting)
     }
 
-    /// Completes the files that are open, with what still belongs to them.
+    /// Completes the open files, with the buffered samples that belong to them.
     fn close(&mut self, streams: &Streams) -> Result<(), RecordError> {
         while self.write_next(streams)? {}
         self.until_ns = None;
         self.files.finish(streams)
     }
 
-    /// Hands what belongs to open files to the operating system: nothing comes for the moment.
+    /// Flushes the samples of open files to the operating system during a pause of the input.
     pub fn flush(&mut self, streams: &Streams) -> Result<(), RecordError> {
         while self.write_next(streams)? {}
         self.files.flush()
     }
 
-    /// Completes the files of an alarm that the end came close to.
+    /// Completes the open files at the end of the run.
     pub fn finish(&mut self, streams: &Streams) -> Result<(), RecordError> {
         self.close(streams)
     }
 
-    /// The files that were completed last, and how many in all.
+    /// Returns the most recently completed files, and the total number of completed files.
     pub fn completed(&self) -> (&[PathBuf], u64) {
         self.files.completed()
     }
 
-    /// Samples that the disk had no room for.
+    /// Number of samples that were lost because the disk was full.
     pub fn dropped(&self) -> u64 {
         self.files.dropped()
     }

@@ -1,4 +1,4 @@
-//! The recorder's part of the pipeline file.
+//! Settings of the recorder in the pipeline file.
 
 use std::path::PathBuf;
 
@@ -10,36 +10,34 @@ use tauscope_archive::whole_file::Existing;
 use crate::error::RecordError;
 use crate::file_name::FileName;
 
-/// A recorder: what is kept of the streams it listens to. At least one of `mcap` and `rerun`.
+/// A recorder of the streams it listens to. At least one of `mcap`, `rerun` and `around_alarms` must be given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// The archive to write (`.mcap`), complete and readable by any ROS 2 tool. Its name has `.part`
-    /// at the end until it is whole. It may hold `{cell}`, `{date}` and `{time}` (UTC, of the first
-    /// sample in it) and `{n}` (the first number that makes the name new).
+    /// The archive of all samples to write (`.mcap`), readable by any ROS 2 tool. Until the file is complete, its
+    /// name ends with `.part`. The name may contain `{cell}`, `{date}` and `{time}` (UTC, of its first sample) and
+    /// `{n}` (the first unused number).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mcap: Option<PathBuf>,
-    /// How the archive's chunks are compressed.
+    /// Compression of the archive's chunks.
     pub compression: Compression,
-    /// When files are closed and new ones begun; their names must hold `{n}` or `{time}` then.
+    /// Condition for closing files and beginning new ones. The names must then contain `{n}` or `{time}`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split: Option<Split>,
-    /// What becomes of a file that already has the name: it is kept, and a run that would replace it
-    /// does not start, or it is replaced once the new one is whole.
+    /// Policy for a file that already has the name. `keep`: a run that would replace it does not start. `replace`: it
+    /// is replaced when the new file is complete.
     pub existing: Existing,
-    /// The archive's chunks are brought to the disk as soon as they are closed, but not more often than
-    /// this \[s\]; 0: only a complete file is, and a power cut may cost all of an incomplete one.
+    /// Smallest interval between syncs of closed chunks to the disk \[s\]. With 0 only complete files are synced, so
+    /// a power failure may lose all of an incomplete file.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub sync_s: f64,
-    /// Recording pauses while the disk has less room than this \[MB, 10⁶ bytes\]. What is not kept
-    /// meanwhile is counted as lost.
+    /// Free disk space below which recording pauses \[MB, 10⁶ bytes\]. Samples during the pause are counted as lost.
     #[schemars(range(min = 1.0))]
     pub min_free_mb: f64,
-    /// How much of what was recorded is kept; by default all. Their names must hold `{n}`, `{date}`
-    /// or `{time}`.
+    /// Retention of recorded files; by default all are kept. The names must then contain `{n}`, `{date}` or `{time}`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub keep: Option<Keep>,
-    /// Files of their own around each alarm, with or without an archive of everything.
+    /// Separate files around each alarm, with or without a complete archive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub around_alarms: Option<AroundAlarms>,
     /// The picture for the Rerun viewer.
@@ -47,11 +45,11 @@ pub struct Config {
     pub rerun: Option<RerunConfig>,
 }
 
-/// How often chunks are synced unless told otherwise \[s\].
-/// Resolution: what a power cut may cost, against the disk's work; as long as a chunk.
+/// Default sync interval of chunks \[s\].
+/// Resolution: loss in a power failure, against disk load; as long as a chunk.
 const SYNC_S: f64 = 0.1;
-/// Room that recording leaves on a disk unless told otherwise \[MB\].
-/// Resolution: enough for others and for the end of what is open.
+/// Default free space below which recording pauses \[MB\].
+/// Resolution: enough for other programs and for completing open files.
 const MIN_FREE_MB: f64 = 500.0;
 
 impl Default for Config {
@@ -71,13 +69,13 @@ impl Default for Config {
 }
 
 impl Config {
-    /// The names of the files in this configuration: archive, then picture.
+    /// Names of the files of the whole run: archive, then picture.
     pub(crate) fn names(&self) -> impl Iterator<Item = &PathBuf> {
         let picture = self.rerun.as_ref().and_then(|rerun| rerun.file.as_ref());
         self.mcap.iter().chain(picture)
     }
 
-    /// The names of all files that it asks for, those around alarms, too: of archives, and of pictures.
+    /// Names of all files, including those around alarms: archives and pictures.
     pub(crate) fn all_names(&self) -> [Vec<&PathBuf>; 2] {
         let around = self.around_alarms.as_ref();
         let picture = self.rerun.as_ref().and_then(|rerun| rerun.file.as_ref());
@@ -91,7 +89,7 @@ impl Config {
         [archives.collect(), pictures.collect()]
     }
 
-    /// The names of the files in which an alarm can be looked at: archives, and the picture that shows least beside it.
+    /// Names of the files that show an alarm: all archives, and the picture with the shortest time span.
     pub fn names_of_alarms(&self) -> Vec<&PathBuf> {
         let [archives, pictures] = self.all_names();
         archives
@@ -100,7 +98,7 @@ impl Config {
             .collect()
     }
 
-    /// The names of all files that it asks for, those around alarms, too.
+    /// Names of all files, including those around alarms.
     pub fn all_names_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let picture = self.rerun.as_mut().and_then(|rerun| rerun.file.as_mut());
         let around = self.around_alarms.as_mut().into_iter();
@@ -108,7 +106,7 @@ impl Config {
         self.mcap.iter_mut().chain(picture).chain(around)
     }
 
-    /// Whether it asks for anything.
+    /// Whether it writes any output.
     pub fn writes_something(&self) -> bool {
         let picture = self.rerun.as_ref();
         self.mcap.is_some()
@@ -120,7 +118,7 @@ impl Config {
     /// Checks the files' names.
     ///
     /// # Errors
-    /// If a name holds a field that there is none of, or there are to be several files of one name.
+    /// If a name contains an unknown field, or several files would have the same name.
     pub fn check_names(&self) -> Result<(), RecordError> {
         for path in self.names() {
             let name = FileName::parse(path)?;
@@ -134,7 +132,7 @@ impl Config {
         Ok(())
     }
 
-    /// Folders that files go to, as far as their names are known before there is a sample.
+    /// Folders of the files, as far as they are known before the first sample.
     pub fn folders(&self, cell: &str) -> Vec<PathBuf> {
         let around = self.around_alarms.as_ref().map(|around| around.files(self));
         let around = around.iter().flat_map(Self::names);
@@ -143,7 +141,7 @@ impl Config {
         names.map(|name| name.known_folder(cell)).collect()
     }
 
-    /// Files that are there and that a recorder of `cell` would have to replace.
+    /// Existing files that a recorder of `cell` would have to replace.
     pub fn in_the_way(&self, cell: &str) -> Vec<PathBuf> {
         let fixed = |path: &PathBuf| FileName::parse(path).ok()?.fixed(cell);
         self.names()
@@ -153,66 +151,65 @@ impl Config {
     }
 }
 
-/// When a recorder closes its files and begins new ones. Each file stands for itself: what holds at
-/// its beginning (command, tool, threshold, alarm) is told again.
+/// Condition for closing the files and beginning new ones. Each file is self-contained: the state at its beginning
+/// (command, tool, threshold, alarm) is written again.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Split {
-    /// After this time, by the samples' own clock \[s\].
+    /// Duration of a file, by the clock of the samples \[s\].
     #[schemars(range(min = 1.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after_s: Option<f64>,
-    /// Once the archive has this size \[MB, 10⁶ bytes\].
+    /// Size of the archive \[MB, 10⁶ bytes\].
     #[schemars(range(min = 1.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after_mb: Option<f64>,
 }
 
-/// How much of what was recorded is kept. The oldest complete file goes first, whenever one was
-/// completed, and also when the disk has less than `min_free_mb`. Only files go that have a name which
-/// this recorder's can become; the one that is being written stays.
+/// Retention of recorded files. The oldest complete files are removed when a file is completed, and when the disk has
+/// less than `min_free_mb` free. Only files that match this recorder's names are removed; the current file is kept.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Keep {
-    /// Of archives together, and of pictures together \[MB, 10⁶ bytes\].
+    /// Largest total size of archives, and of pictures \[MB, 10⁶ bytes\].
     #[schemars(range(min = 1.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_most_mb: Option<f64>,
-    /// For so long after a file was completed, or until the newest one was; the newest stays \[days\].
+    /// Largest age of a file, from its completion to now or to the newest file; the newest file is kept \[days\].
     #[schemars(range(min = 0.01))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_most_days: Option<f64>,
 }
 
-/// Files around each alarm. What came before an alarm is held in memory; alarms that lie so close that
-/// their files would overlap share one.
+/// Files around each alarm. The samples before an alarm are buffered in memory. Alarms whose files would overlap
+/// share one file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AroundAlarms {
     /// The archive of each alarm (`.mcap`), with `{n}` or `{time}` in its name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mcap: Option<PathBuf>,
-    /// The picture of each alarm (`.rrd`), likewise.
+    /// The picture of each alarm (`.rrd`), with `{n}` or `{time}` in its name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rerun: Option<PathBuf>,
-    /// From so long before the alarm \[s\].
+    /// Recorded time before the alarm \[s\].
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub before_s: f64,
-    /// To so long after its end \[s\].
+    /// Recorded time after the end of the alarm \[s\].
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub after_s: f64,
-    /// Memory for what came before; where it is not enough, the file begins later \[MB, 10⁶ bytes\].
+    /// Memory for the samples before an alarm; if it is too small, the file begins later \[MB, 10⁶ bytes\].
     #[schemars(range(min = 1.0))]
     pub at_most_mb: f64,
 }
 
-/// Time before an alarm unless told otherwise \[s\].
-/// Resolution: what a person wants to see of how it came to it.
+/// Default recorded time before an alarm \[s\].
+/// Resolution: enough for a person to see what led to the alarm.
 const BEFORE_S: f64 = 20.0;
-/// Time after an alarm unless told otherwise \[s\].
-/// Resolution: likewise.
+/// Default recorded time after an alarm \[s\].
+/// Resolution: enough for a person to see what followed the alarm.
 const AFTER_S: f64 = 10.0;
-/// Memory for it unless told otherwise \[MB\]: a minute of three streams at 1 kHz.
+/// Default memory for the samples before an alarm, a minute of three streams at 1 kHz \[MB\].
 /// Resolution: memory.
 const RING_MB: f64 = 150.0;
 
@@ -229,7 +226,7 @@ impl Default for AroundAlarms {
 }
 
 impl AroundAlarms {
-    /// Its files, as a recorder of everything would be told them: a new one each time.
+    /// Settings of a plain recorder for its files, with a new file for each alarm.
     pub(crate) fn files(&self, of: &Config) -> Config {
         Config {
             mcap: self.mcap.clone(),
@@ -244,16 +241,16 @@ impl AroundAlarms {
     }
 }
 
-/// Where the picture goes: to a file, to a viewer, or to both.
+/// Output of the picture: a file, a viewer, or both.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RerunConfig {
-    /// The file to write (`.rrd`), named and split as the archive is. Sure to
-    /// open in the viewer of this version and the next; the archive is what lasts.
+    /// The file to write (`.rrd`), named and split like the archive. Only the viewer of this version and the next is
+    /// sure to open it; for permanent storage use the archive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// The viewer to stream to, e.g. `rerun+http://127.0.0.1:9876/proxy`. It may come and go; what
-    /// it does not take in time is left out of the live picture only.
+    /// The viewer to stream to, e.g. `rerun+http://127.0.0.1:9876/proxy`. It may connect and disconnect at any time.
+    /// Data that it does not receive in time is missing only in the live view.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub connect: Option<String>,
 }

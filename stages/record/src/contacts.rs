@@ -1,25 +1,25 @@
-//! The contacts of all detectors that a recorder listens to: archive and pictures tell the same of each.
+//! Contacts of all detectors that a recorder listens to, shared by archive and pictures.
 
 use tauscope_bus::command::MuteLease;
 use tauscope_bus::{Contact, ContactFollower, SampleRef};
 
 use crate::streams::Streams;
 
-/// One follower a stream.
+/// Contact followers, one per stream.
 pub(crate) struct Contacts {
     followers: Vec<ContactFollower>,
-    /// The newest mute, by cell.
+    /// Latest mute by cell.
     mutes: Vec<Option<MuteLease>>,
 }
 
-/// What is known of a detector's contact at a sample.
+/// A detector's contact at a sample.
 #[derive(Debug, Default)]
 pub(crate) struct Told<'a> {
-    /// The contact that lasts, as far as it is known by now.
+    /// The current contact with its estimate so far.
     pub open: Option<&'a Contact>,
     /// The contact that ended at this sample.
     pub ended: Option<Contact>,
-    /// The cell is muted.
+    /// Whether the cell is muted.
     pub muted: bool,
 }
 
@@ -31,7 +31,7 @@ impl Contacts {
         }
     }
 
-    /// Takes a sample of the stream number `index`.
+    /// Processes a sample of the stream number `index`.
     pub fn push(&mut self, streams: &Streams, index: usize, sample: SampleRef<'_>) -> Told<'_> {
         let mute = &mut self.mutes[streams.all[index].cell];
         let detection = match sample {

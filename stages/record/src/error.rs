@@ -1,4 +1,4 @@
-//! What can go wrong in a recorder.
+//! Errors of a recorder.
 
 use std::path::PathBuf;
 
@@ -6,18 +6,18 @@ use tauscope_bus::SampleKind;
 
 use crate::file_name::FileNameError;
 
-/// Why a recorder cannot be made, or cannot go on.
+/// Error that prevents or ends recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The configuration asks for nothing.
+    /// A configuration without output.
     #[error(
         "a recorder must write something: give `mcap`, `rerun: {{file: …}}`, `rerun: {{connect: …}}` or `around_alarms: {{mcap: …}}`"
     )]
     NothingToWrite,
-    /// A file's name cannot be filled in.
+    /// An invalid file name.
     #[error(transparent)]
     FileName(#[from] FileNameError),
-    /// There are to be several files, and all would have one name.
+    /// A single name for several files.
     #[error(
         "there are to be several files, but `{name}` names only one: put `{{n}}` or `{{time}}` into it", name = name.display()
     )]
@@ -25,112 +25,112 @@ pub enum RecordError {
         /// The name.
         name: PathBuf,
     },
-    /// The file of one cell is asked for where several are recorded.
+    /// A file name with `{cell}` for a recorder of several cells.
     #[error("`{{cell}}` in a file's name stands for one cell, but the recorder listens to {cells}")]
     SeveralCells {
-        /// How many.
+        /// Number of cells.
         cells: usize,
     },
-    /// A folder cannot be looked into.
+    /// A folder that cannot be listed.
     #[error("cannot look for a new file name: {0}")]
     Folder(std::io::Error),
-    /// Two cells of one name.
+    /// Two cells with the same name.
     #[error("two cells are named `{cell}`")]
     DuplicateCell {
         /// The name.
         cell: String,
     },
-    /// Two streams of one stage.
+    /// Two streams from the same stage.
     #[error("two streams come from a stage named `{stage}`")]
     DuplicateStream {
         /// The stage.
         stage: String,
     },
-    /// A stream of a cell that is not there.
+    /// A stream of an unknown cell.
     #[error("stage `{stage}` belongs to cell `{cell}`, but the recorder knows only: {known}")]
     UnknownCell {
         /// The stage.
         stage: String,
         /// Its cell.
         cell: String,
-        /// The cells there are.
+        /// The known cells.
         known: String,
     },
-    /// A sample of a stage that was not announced.
+    /// A sample of an unannounced stage.
     #[error("a sample came from stage `{stage}`, but the recorder listens only to: {known}")]
     UnknownStream {
         /// The stage.
         stage: String,
-        /// The stages there are.
+        /// The announced stages.
         known: String,
     },
-    /// A sample of another type than was announced.
+    /// A sample of an unexpected type.
     #[error("stage `{stage}` sent a {found}, expected a {expected}", found = found.type_name(), expected = expected.type_name())]
     WrongKind {
         /// The stage.
         stage: String,
-        /// What was announced.
+        /// The announced type.
         expected: SampleKind,
-        /// What came.
+        /// The received type.
         found: SampleKind,
     },
-    /// A sample of another number of joints than its cell has.
+    /// A sample with the wrong number of joints.
     #[error("stage `{stage}` sent {found} joints, its cell `{cell}` has {expected}")]
     JointCount {
         /// The stage.
         stage: String,
         /// Its cell.
         cell: String,
-        /// How many joints the cell has.
+        /// Number of joints of the cell.
         expected: usize,
-        /// How many came.
+        /// Number of joints of the sample.
         found: usize,
     },
-    /// A model with other joints than the cell.
+    /// A model whose number of joints differs from that of the cell.
     #[error("cell `{cell}` has {joints} joints, its robot model {model}")]
     ModelJoints {
         /// The cell.
         cell: String,
-        /// How many joints the cell has.
+        /// Number of joints of the cell.
         joints: usize,
-        /// How many the model has.
+        /// Number of joints of the model.
         model: usize,
     },
-    /// The archive cannot be written.
+    /// A failed write of the archive.
     #[error(transparent)]
     Archive(#[from] tauscope_archive::WriteError),
-    /// The picture's file cannot be written.
+    /// A failed write of the picture's file.
     #[error("cannot write `{path}`: {reason}", path = path.display())]
     RerunFile {
         /// The file.
         path: PathBuf,
-        /// What failed.
+        /// The cause.
         reason: String,
-        /// The disk is full.
+        /// Whether the disk is full.
         full: bool,
     },
-    /// The viewer's address is not one.
+    /// An invalid address of a viewer.
     #[error(
         "`{url}` is no address of a Rerun viewer such as rerun+http://127.0.0.1:9876/proxy: {reason}"
     )]
     Connect {
-        /// What was given.
+        /// The given address.
         url: String,
-        /// What is wrong with it.
+        /// The cause.
         reason: String,
     },
-    /// Rerun could not take the data.
+    /// Data that Rerun cannot encode.
     #[error("cannot encode `{entity}` for Rerun: {reason}")]
     Encode {
         /// The entity.
         entity: String,
-        /// What failed.
+        /// The cause.
         reason: String,
     },
 }
 
 impl RecordError {
-    /// Whether nothing is wrong but that the disk, or this user's share of it, is full.
+    /// Whether the cause is a full disk or an exceeded quota.
     pub(crate) fn is_disk_full(&self) -> bool {
         match self {
             Self::Archive(error) => says_full(error),
@@ -140,7 +140,7 @@ impl RecordError {
     }
 }
 
-/// Whether `error`, or what lies behind it, is that the disk is full.
+/// Whether `error` or one of its sources is a full disk or an exceeded quota.
 pub(crate) fn says_full(error: &(dyn std::error::Error + 'static)) -> bool {
     let full = |error: &std::io::Error| {
         matches!(

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use jiff::Timestamp;
 use tauscope_archive::whole_file::part_of;
 
-/// A file's name with fields that are filled in when the file is begun: `{cell}`, `{date}` and
-/// `{time}` (UTC, of the first sample in it, as `2026-11-22` and `14-03-05`) and `{n}` (the first
-/// number, from 001 on, that makes the name new). `{{` and `}}` are braces that stay.
+/// Template of a file name. Its fields are filled in when the file is begun: `{cell}`, `{date}` and `{time}` (UTC, of
+/// its first sample, as `2026-11-22` and `14-03-05`) and `{n}` (the first unused number, from 001). `{{` and `}}` are
+/// literal braces.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileName {
     parts: Vec<Part>,
@@ -25,36 +25,36 @@ enum Part {
     Number,
 }
 
-/// Why a name cannot be filled in.
+/// Error in the template of a file name.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum FileNameError {
-    /// A field that there is none of.
+    /// An unknown field.
     #[error(
         "`{{{field}}}` is no field of a file name; there are `{{cell}}`, `{{date}}`, `{{time}}` and `{{n}}`"
     )]
     UnknownField {
-        /// What stands between the braces.
+        /// The text between the braces.
         field: String,
     },
-    /// A brace without its other half.
+    /// An unpaired brace.
     #[error("a `{{` or `}}` stands alone in the file name `{name}`")]
     LoneBrace {
         /// The name.
         name: String,
     },
-    /// A name that is not text.
+    /// A name that is not valid UTF-8.
     #[error("the file name `{name}` is not valid UTF-8")]
     NotText {
-        /// The name, as far as it can be shown.
+        /// The name in lossy form.
         name: String,
     },
 }
 
 impl FileName {
-    /// Takes a name apart.
+    /// Parses a template.
     ///
     /// # Errors
-    /// If it holds a field that there is none of, or a brace alone.
+    /// If it contains an unknown field or an unpaired brace.
     pub fn parse(path: &Path) -> Result<Self, FileNameError> {
         let name = path.to_str().ok_or_else(|| FileNameError::NotText {
             name: path.display().to_string(),
@@ -98,21 +98,21 @@ impl FileName {
         Ok(Self { parts })
     }
 
-    /// A path as a file's name in which no brace means anything.
+    /// Escapes the braces of a path.
     pub fn literal(path: &Path) -> PathBuf {
         match path.to_str() {
             Some(text) => text.replace('{', "{{").replace('}', "}}").into(),
-            // Not text, so without fields.
+            // A path that is not UTF-8 has no fields.
             None => path.to_owned(),
         }
     }
 
-    /// The file, where it does not hang on when it is begun.
+    /// The path, if it does not depend on time or number.
     pub fn fixed(&self, cell: &str) -> Option<PathBuf> {
         (!self.can_differ()).then(|| self.fill(cell, Timestamp::default(), 0))
     }
 
-    /// What all files of a cell match: `*` for what is only known when a file is begun, as a shell takes it.
+    /// Shell pattern that all files of a cell match, with `*` for date, time and number.
     pub fn pattern(&self, cell: &str) -> String {
         let parts = self.parts.iter().map(|part| match part {
             Part::Text(text) => text,
@@ -122,17 +122,17 @@ impl FileName {
         parts.collect()
     }
 
-    /// Whether the name is known before the first sample is.
+    /// Whether the name is known before the first sample.
     pub fn is_known_at_start(&self) -> bool {
         !(self.parts.iter()).any(|part| matches!(part, Part::Date | Part::Time))
     }
 
-    /// Whether one name can become several files.
+    /// Whether the template can give several file names.
     pub fn can_differ(&self) -> bool {
         !(self.parts.iter()).all(|part| matches!(part, Part::Text(_) | Part::Cell))
     }
 
-    /// Whether it stands for the file of one cell.
+    /// Whether it contains the field for a single cell.
     pub(crate) fn is_of_one_cell(&self) -> bool {
         self.parts.contains(&Part::Cell)
     }
@@ -141,7 +141,7 @@ impl FileName {
         self.parts.contains(&Part::Number)
     }
 
-    /// The folder that its files go to, as far as it is known before the first sample is.
+    /// The folder of its files, as far as it is known before the first sample.
     pub fn known_folder(&self, cell: &str) -> PathBuf {
         let mut known = String::new();
         for part in &self.parts {
@@ -155,11 +155,11 @@ impl FileName {
         known.into()
     }
 
-    /// Files that are there by a name that this one can become, also by one with a number put in as in
-    /// `a.1.mcap`, and with `ending` behind it.
+    /// Existing files whose names match the template, followed by `ending`. Names with an inserted number such as
+    /// `a.1.mcap` match, too.
     ///
     /// # Errors
-    /// If a folder that is there cannot be read.
+    /// If an existing folder cannot be read.
     pub(crate) fn all_like(&self, cell: &str, ending: &str) -> io::Result<Vec<PathBuf>> {
         let mut found = Vec::new();
         like::find(PathBuf::new(), &self.components(), cell, ending, &mut found)?;
@@ -167,7 +167,7 @@ impl FileName {
         Ok(found)
     }
 
-    /// Its parts, folder by folder; the last is the file.
+    /// Its parts by path component; the last component is the file.
     fn components(&self) -> Vec<Vec<Part>> {
         let mut components = Vec::new();
         let mut last = Vec::new();
@@ -201,7 +201,7 @@ impl FileName {
     }
 }
 
-/// Fills in the names of files that belong together, so that all get the same number.
+/// Fills in the names of files that belong together, with the same number for all.
 ///
 /// # Errors
 /// If a folder cannot be read.

@@ -1,4 +1,4 @@
-//! The files that a recorder writes at a time: the archive and the picture of the same samples.
+//! The current files of a recorder: archive and picture of the same samples.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -17,10 +17,10 @@ use crate::room::Room;
 use crate::set_back::SetBack;
 use crate::streams::Streams;
 
-/// Where files go and when new ones begin.
+/// Writer of the recorder's files, which begins new ones according to the settings.
 pub(crate) struct Files {
     config: Config,
-    /// What made them: stands in each archive.
+    /// Provenance, stored in each archive.
     provenance: BTreeMap<String, String>,
     mcap: Option<FileName>,
     rerun: Option<FileName>,
@@ -28,13 +28,13 @@ pub(crate) struct Files {
     clock: SetBack,
     room: Room,
     retention: Retention,
-    /// The disk has too little room: what comes is counted and not kept.
+    /// Whether the disk has too little space, so that samples are counted but not kept.
     paused: bool,
-    /// Samples that were not kept.
+    /// Number of samples that were not kept.
     dropped: u64,
-    /// Those of them that were told.
+    /// Number of lost samples that were already reported.
     dropped_told: u64,
-    /// Names of the files that were completed last.
+    /// Names of the most recently completed files.
     completed: Vec<PathBuf>,
     completed_count: u64,
 }
@@ -42,16 +42,16 @@ pub(crate) struct Files {
 struct OpenFiles {
     archive: Option<Archive>,
     picture: Option<FilePicture>,
-    /// When the first sample in them was received \[ns since the epoch\].
+    /// Reception time of their first sample \[ns since the epoch\].
     start_ns: Option<i64>,
-    /// Samples since the archive's last chunk was closed: what is lost where it cannot be written on.
+    /// Number of samples since the archive's last chunk was closed, which a failed write would lose.
     unwritten: u64,
-    /// Length of the archive at that time \[bytes\].
+    /// Length of the archive up to that chunk \[bytes\].
     written_bytes: u64,
 }
 
 impl Files {
-    /// Takes the names apart and begins the files whose names are known by now.
+    /// Parses the names, and begins the files if their names are known in advance.
     pub fn new(
         config: &Config,
         provenance: &BTreeMap<String, String>,
@@ -65,7 +65,7 @@ impl Files {
         Ok(files)
     }
 
-    /// Takes the names apart; files are begun with the first sample.
+    /// Parses the names; files are begun with the first sample.
     pub fn later(
         config: &Config,
         provenance: &BTreeMap<String, String>,
@@ -101,7 +101,7 @@ impl Files {
         Ok(files)
     }
 
-    /// Samples that were not kept because the disk had no room.
+    /// Number of samples that were lost because the disk was full.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }
@@ -110,7 +110,7 @@ impl Files {
         self.mcap.iter().chain(&self.rerun)
     }
 
-    /// Takes a sample of the stream number `index`, into new files if it is time for them.
+    /// Writes a sample of the stream number `index`; begins new files if they are due.
     pub fn accept(
         &mut self,
         streams: &Streams,
@@ -142,9 +142,9 @@ impl Files {
         told: &Told<'_>,
     ) -> Result<(), RecordError> {
         let now_ns = sample.header().received_ns;
-        // Of what a stage has done is told ahead of its samples, which may wait in a queue.
+        // Health reports may overtake the samples of their stage, which wait in a queue.
         let is_of_time = !matches!(sample, SampleRef::Health(_));
-        // A file is read in the order of reception: what came behind a clock that was set back would come first.
+        // Files are read in the order of reception times, so samples after a clock step back would be sorted first.
         let is_set_back = is_of_time && self.clock.note(index, now_ns).is_some();
         let ends = is_set_back && self.names().all(FileName::can_differ);
         if is_of_time && (self.open.as_ref()).is_some_and(|open| ends || self.is_full(open, now_ns))
@@ -169,7 +169,7 @@ impl Files {
         kept
     }
 
-    /// Whether the disk has room to go on; pauses where it has none, and says so.
+    /// Checks the free disk space; pauses or resumes recording accordingly, with a warning.
     fn has_room(&mut self, streams: &Streams) -> Result<bool, RecordError> {
         let archive = self.open.as_ref().and_then(|open| open.archive.as_ref());
         let reserve = archive.map_or(0, Archive::index_bytes);
@@ -180,7 +180,7 @@ impl Files {
         if enough && self.paused {
             self.paused = false;
             let lost = self.lost();
-            tracing::warn!("{}: recording goes on; {lost}", self.room);
+            tracing::warn!("{}: recording continues; {lost}", self.room);
         }
         if !enough && !self.paused {
             self.paused = true;
@@ -196,7 +196,7 @@ impl Files {
         Ok(enough)
     }
 
-    /// Where old files may go for new ones: removes the oldest until there is room.
+    /// Removes the oldest files until there is enough space, if the settings allow it.
     fn make_room(&mut self, streams: &Streams, reserve: u64) -> bool {
         if self.config.keep.is_none() {
             return false;
@@ -221,13 +221,13 @@ impl Files {
         }
     }
 
-    /// What was lost since it was last told.
+    /// Message about the samples lost since the last report.
     fn lost(&mut self) -> String {
         let lost = self.dropped - std::mem::replace(&mut self.dropped_told, self.dropped);
         format!("{lost} samples were not kept")
     }
 
-    /// Leaves the open files as they are: the disk was full before it was noticed.
+    /// Leaves the open files unfinished after a write failed because the disk was full.
     fn abandon(&mut self, error: &RecordError) {
         self.paused = true;
         self.room.look();
@@ -257,7 +257,7 @@ impl Files {
         let cell = first_cell(streams);
         let names: Vec<&FileName> = self.names().collect();
         let paths = fill_in(&names, cell, start_ns).map_err(RecordError::Folder)?;
-        // What this run has completed is not replaced by what it goes on with.
+        // Later files of this run must not replace its own earlier ones.
         let again = paths.iter().any(|path| self.completed.contains(path));
         let existing = if again {
             Existing::Keep
@@ -279,7 +279,7 @@ impl Files {
         })
     }
 
-    /// Hands all to the operating system.
+    /// Flushes all data to the operating system.
     pub fn flush(&mut self) -> Result<(), RecordError> {
         let Some(open) = &mut self.open else {
             return Ok(());
@@ -291,7 +291,7 @@ impl Files {
         Ok(())
     }
 
-    /// Completes the files that are open. The names of those that were completed last are forgotten.
+    /// Completes the open files and replaces the list of completed names.
     pub fn finish(&mut self, streams: &Streams) -> Result<(), RecordError> {
         match self.complete(streams) {
             Err(error) if error.is_disk_full() => self.abandon(&error),
@@ -311,7 +311,7 @@ impl Files {
         let unwritten = open.unwritten;
         let mut completed = Vec::new();
         let complete = || {
-            // The archive first: it is what lasts, whatever becomes of the picture.
+            // The archive first, because it is the permanent record even if the picture fails.
             if let Some(archive) = open.archive {
                 completed.push(archive.finish()?);
             }
@@ -345,7 +345,7 @@ impl Files {
         }
     }
 
-    /// The files that were completed last, and how many were in all.
+    /// Returns the most recently completed files, and the total number of completed files.
     pub fn completed(&self) -> (&[PathBuf], u64) {
         (&self.completed, self.completed_count)
     }

@@ -1,4 +1,4 @@
-//! What an earlier life of a recorder left unfinished is repaired by its next.
+//! Repair of files that an earlier run of a recorder left unfinished.
 
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
@@ -10,21 +10,21 @@ use crate::config::Config;
 use crate::file_name::FileName;
 use crate::rerun;
 
-/// How long the end of a run waits for a repair; what is not repaired by then is by the next run.
-/// Resolution: less than a recorder is given to end.
+/// Longest time that the end of a run waits for a repair; the next run completes it.
+/// Resolution: shorter than the shutdown timeout of a recorder.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// How often it is looked whether a repair is done.
-/// Resolution: how soon the end of a run goes on.
+/// Poll interval for the end of a repair.
+/// Resolution: delay of the end of a run.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Repairs, on a thread of their own.
+/// Repairs in a separate thread.
 pub(crate) struct Leftovers {
     thread: Option<JoinHandle<()>>,
 }
 
 impl Leftovers {
-    /// Begins to repair the unfinished files of `config`'s names that nobody writes, those around alarms too: archives
-    /// first, then pictures.
+    /// Starts the repair of unfinished files that match the names of `config`, including those around alarms, and
+    /// that no process is writing: archives first, then pictures.
     pub fn repair(config: &Config, cell: &str) -> Self {
         let [archives, pictures] = config.all_names();
         let archives = unattended(&archives, cell);
@@ -49,13 +49,13 @@ impl Leftovers {
                 thread: Some(thread),
             },
             Err(error) => {
-                tracing::warn!("cannot repair what runs before left: {error}");
+                tracing::warn!("cannot repair unfinished files of earlier runs: {error}");
                 Self { thread: None }
             }
         }
     }
 
-    /// Gives what is being repaired some time to be done.
+    /// Waits up to [`PATIENCE`] for the repairs to complete.
     pub fn wait(&mut self) {
         let Some(thread) = self.thread.take() else {
             return;
@@ -64,7 +64,7 @@ impl Leftovers {
         while !thread.is_finished() {
             if begun.elapsed() > PATIENCE {
                 tracing::warn!(
-                    "an archive of a run before is not repaired yet: the next run does it"
+                    "an archive of an earlier run is not repaired yet: the next run repairs it"
                 );
                 return;
             }
@@ -73,18 +73,18 @@ impl Leftovers {
     }
 }
 
-/// The unfinished files of these names that nobody writes.
+/// Unfinished files that match these names and that no process is writing.
 fn unattended(names: &[&PathBuf], cell: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for name in names {
-        // A name that is none keeps the recorder from beginning, and is told there.
+        // An invalid name prevents the start of the recorder and is reported there.
         let Ok(name) = FileName::parse(name) else {
             continue;
         };
         match name.all_like(cell, ".part") {
             Ok(mut parts) => found.append(&mut parts),
             Err(error) => {
-                tracing::warn!("cannot look for unfinished files of runs before: {error}");
+                tracing::warn!("cannot look for unfinished files of earlier runs: {error}");
             }
         }
     }
@@ -100,8 +100,8 @@ fn has_room(part: &Path, min_free_mb: f64) -> bool {
     let free_mb = whole_file::free_bytes(part).map_or(f64::INFINITY, |bytes| bytes as f64 * 1e-6);
     if free_mb < needed_mb {
         tracing::warn!(
-            "{shown}, which a run before left unfinished, is not repaired: that needs {needed_mb:.0} MB \
-             of room, and {free_mb:.0} MB are left"
+            "{shown}, which an earlier run left unfinished, is not repaired: that needs {needed_mb:.0} MB \
+             of free space, and {free_mb:.0} MB are free"
         );
     }
     free_mb >= needed_mb
@@ -114,7 +114,7 @@ fn archive(part: &Path) {
             let path = repaired.written.path.display();
             let messages = repaired.written.messages;
             tracing::warn!(
-                "{shown}, which a run before left unfinished, was repaired: {path}, {messages} messages"
+                "{shown}, which an earlier run left unfinished, was repaired: {path}, {messages} messages"
             );
             let Some(aside) = &repaired.set_aside else {
                 return;
@@ -128,10 +128,10 @@ fn archive(part: &Path) {
                 );
             }
         }
-        // Another recorder of these names was first.
+        // Another recorder with these names has started the repair.
         Err(RepairError::BeingWritten { .. }) => {}
         Err(error) => tracing::warn!(
-            "{shown}, which a run before left unfinished, cannot be repaired: {error}"
+            "{shown}, which an earlier run left unfinished, cannot be repaired: {error}"
         ),
     }
 }
@@ -141,12 +141,12 @@ fn picture(part: &Path) {
     match rerun::repair_in_place(part) {
         Ok(Some(path)) => {
             let path = path.display();
-            tracing::warn!("{shown}, which a run before left unfinished, was repaired: {path}");
+            tracing::warn!("{shown}, which an earlier run left unfinished, was repaired: {path}");
         }
-        // Another recorder of these names was first.
+        // Another recorder with these names has started the repair.
         Ok(None) => {}
         Err(error) => tracing::warn!(
-            "{shown}, which a run before left unfinished, cannot be repaired: {error}"
+            "{shown}, which an earlier run left unfinished, cannot be repaired: {error}"
         ),
     }
 }

@@ -1,5 +1,4 @@
-//! What stays of the streams: the MCAP archive, complete and for ever, and the Rerun picture, to
-//! look at.
+//! Recorder of the streams: a complete MCAP archive for permanent storage, and a Rerun picture for viewing.
 
 mod archive;
 mod around_alarms;
@@ -29,7 +28,7 @@ pub use streams::{CellInfo, StreamInfo};
 pub use tauscope_archive::Compression;
 pub use tauscope_archive::whole_file::Existing;
 
-/// Version of Rerun that the pictures are made for; a viewer of this version opens them.
+/// Version of Rerun that writes the pictures; a viewer of this version opens them.
 pub fn rerun_version() -> String {
     ::rerun::build_info().version.to_string()
 }

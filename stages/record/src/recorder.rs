@@ -14,11 +14,10 @@ use crate::leftovers::Leftovers;
 use crate::rerun::LivePicture;
 use crate::streams::{CellInfo, StreamInfo, Streams};
 
-/// Keeps what it listens to: all of it in an archive, a view of it for the Rerun viewer.
+/// Records its input streams: completely in an archive, and as a picture for the Rerun viewer.
 ///
-/// Memory is bounded: an open chunk of the archive, some seconds of the picture's file, some seconds
-/// of a live picture that no viewer takes. Only the indexes of the two files grow, by about 35 MB an
-/// hour together.
+/// Memory is bounded: an open chunk of the archive, some seconds of the picture's file, and some seconds of a live
+/// picture that no viewer receives. Only the indexes of the two files grow, together by about 35 MB per hour.
 pub struct Recorder {
     streams: Streams,
     contacts: Contacts,
@@ -26,18 +25,18 @@ pub struct Recorder {
     around_alarms: Option<AroundAlarms>,
     live: Option<LivePicture>,
     leftovers: Option<Leftovers>,
-    /// Names of the files that were completed last.
+    /// Names of the most recently completed files.
     completed: Vec<PathBuf>,
     completed_count: u64,
 }
 
 impl Recorder {
-    /// Opens all that `config` asks for. `cells` and `streams` say what will come; `provenance` is
-    /// what made it (versions, hashes of the files that went in) and stands in the archive.
+    /// Opens all outputs of `config`. `cells` and `streams` announce the input; `provenance` (versions, hashes of the
+    /// input files) is stored in the archive.
     ///
     /// # Errors
-    /// If nothing is to be written, cells, streams and file names do not fit together, a file cannot
-    /// be made or the viewer's address is none. That no viewer is there is no error.
+    /// If there is no output, cells, streams and file names are inconsistent, a file cannot be created, or the
+    /// viewer's address is invalid. A missing viewer is no error.
     pub fn new(
         config: &Config,
         cells: &[CellInfo],
@@ -70,16 +69,16 @@ impl Recorder {
         })
     }
 
-    /// Begins to repair what earlier recorders of `config`'s names, which died, left unfinished. It says
-    /// what it has repaired. Never destroys data: what is repaired is only removed once all of it is in a
-    /// new file on the disk.
+    /// Starts the repair of unfinished files of crashed recorders that match the names of `config`, and reports each
+    /// repair. It never destroys data: an unfinished file is removed only when all of its content is in a new file on
+    /// the disk.
     pub fn repair_leftovers(&mut self, config: &Config) {
         let cell = self.streams.cells.first().map_or("", |cell| &cell.name);
         self.leftovers = Some(Leftovers::repair(config, cell));
     }
 
-    /// Messages of the live picture that the viewer was too slow for, or not there for. No data is
-    /// lost by it: the files hold everything.
+    /// Number of messages of the live picture that were dropped because the viewer was too slow or not connected. The
+    /// files still contain all data.
     pub fn live_dropped(&self) -> u64 {
         self.live.as_ref().map_or(0, LivePicture::dropped)
     }
@@ -107,7 +106,7 @@ impl Recorder {
         self.live.as_mut().map_or(Ok(()), LivePicture::idle)
     }
 
-    /// The files of all, and those around alarms, in one list.
+    /// Updates the list of completed files, including those around alarms.
     fn note_completed(&mut self) {
         let (files, count) = self.files.completed();
         let around = self.around_alarms.as_ref().map(AroundAlarms::completed);
@@ -150,7 +149,7 @@ impl Sink for Recorder {
 
     fn dropped(&self) -> u64 {
         let around = self.around_alarms.as_ref();
-        // A sample that neither kept is one sample.
+        // The maximum, because a sample missing in both outputs must count once.
         (self.files.dropped()).max(around.map_or(0, AroundAlarms::dropped))
     }
 }

@@ -1,10 +1,10 @@
-//! The picture of the streams, for the Rerun viewer: to a file, live, or both.
+//! The picture of the streams for the Rerun viewer: in a file, live, or both.
 //!
-//! Entities lie where Rerun's own MCAP importer would put those of the archive
-//! (`<topic>/{position,velocity,effort}`), on its timelines, and beside them what the importer does
-//! not make: the robot (`robot/<link>`, moved by `transforms`), detectors
+//! Entities and timelines are those of Rerun's MCAP importer for the archive
+//! (`<topic>/{position,velocity,effort}`). In addition there are entities that the importer does
+//! not create: the robot (`robot/<link>`, moved by `transforms`), detectors
 //! (`detections/<detector>/{score,threshold,state,events}`) and forces
-//! (`external_wrench/<detector>`). With several cells all begins with the cell's name.
+//! (`external_wrench/<detector>`). With several cells, all paths begin with the cell's name.
 
 mod blueprint;
 mod detections;
@@ -41,7 +41,7 @@ pub(crate) struct FilePicture {
 }
 
 impl FilePicture {
-    /// Makes the file.
+    /// Creates the file.
     pub fn create(path: &Path, existing: Existing, streams: &Streams) -> Result<Self, RecordError> {
         let mut file = PictureFile::create(path, existing)?;
         let painter = Painter::new(streams, Pace::FILE, &mut |m| file.write(&m))?;
@@ -65,14 +65,14 @@ impl FilePicture {
         })
     }
 
-    /// Completes the file; gives its name.
+    /// Completes the file; returns its path.
     pub fn finish(self, streams: &Streams) -> Result<PathBuf, RecordError> {
         let Self {
             mut painter,
             mut file,
         } = self;
         painter.flush(&mut |message| file.write(&message))?;
-        // Once more: only now is known where the robot went, and so from where to look at it.
+        // Repeat the layout: only now the extent of the robot's motion, and thus the view point, is known.
         for message in blueprint::messages(streams, &painter, Purpose::File)? {
             file.write(&message)?;
         }
@@ -80,14 +80,14 @@ impl FilePicture {
     }
 }
 
-/// The picture as it streams to a viewer.
+/// The picture streamed to a viewer.
 pub(crate) struct LivePicture {
     painter: Painter,
     live: Live,
 }
 
 impl LivePicture {
-    /// Begins to connect.
+    /// Starts to connect.
     pub fn start(url: &str, streams: &Streams) -> Result<Self, RecordError> {
         let mut preamble = Vec::new();
         let mut gather = |message: LogMsg| {
@@ -112,20 +112,20 @@ impl LivePicture {
         painter.accept(streams, (index, sample, told), &mut push_to(live))
     }
 
-    /// Shows the viewer what was gathered.
+    /// Sends the gathered data to the viewer.
     pub fn idle(&mut self) -> Result<(), RecordError> {
         let Self { painter, live } = self;
         painter.flush(&mut push_to(live))
     }
 
-    /// Lets the viewer go.
+    /// Sends the remaining data and disconnects from the viewer.
     pub fn finish(&mut self) -> Result<(), RecordError> {
         self.idle()?;
         self.live.finish();
         Ok(())
     }
 
-    /// Messages for the viewer that gave way to newer ones.
+    /// Number of messages for the viewer that were dropped in favour of newer ones.
     pub fn dropped(&self) -> u64 {
         self.live.counts().dropped
     }

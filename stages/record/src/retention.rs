@@ -1,8 +1,8 @@
-//! Oldest first: what is given up of what was recorded.
+//! Retention of recordings: the oldest files are removed first.
 //!
-//! Clocks are set wrong and set right again, and a recording that is gone is gone. What this run has completed is as
-//! old as it is by a clock that only runs. The age of other files is the time until the newest one was completed, and
-//! this host's clock is believed a jump ahead only after a day. The newest file stays.
+//! A wrong system clock must not delete recordings. The age of files of this run is measured by the monotonic clock.
+//! The age of other files is the time up to the completion of the newest file. After a jump ahead, the system clock
+//! is trusted only after a day. The newest file is always kept.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,11 +15,11 @@ use tauscope_archive::whole_file;
 use crate::config::Keep;
 use crate::file_name::FileName;
 
-/// A clock that is ahead by more than this of one that only runs has jumped.
-/// Resolution: no clock that is steered drifts so far between two files.
+/// Advance of the system clock over the monotonic clock above which it has jumped.
+/// Resolution: a disciplined clock drifts less between two files.
 const JUMP: Duration = Duration::from_hours(1);
-/// So long after a jump ahead the clock is believed.
-/// Resolution: somebody looks at a plant once a day.
+/// Time after a jump ahead until the system clock is trusted.
+/// Resolution: a plant is inspected once a day.
 const BELIEVED_AFTER: Duration = Duration::from_hours(24);
 
 /// A complete file.
@@ -28,11 +28,12 @@ struct Closed {
     path: PathBuf,
     bytes: u64,
     modified: SystemTime,
-    /// When this run completed it; `None` where another one did. Those of this run are newer, whatever the clock said.
+    /// Time at which this run completed it; `None` for other runs. Files of this run are newer, whatever their clock
+    /// time.
     completed: Option<Instant>,
 }
 
-/// An instant by the clock that people set and by one that only runs.
+/// An instant by the system clock and by the monotonic clock.
 #[derive(Debug, Clone, Copy)]
 struct Now {
     clock: SystemTime,
@@ -48,11 +49,11 @@ impl Now {
     }
 }
 
-/// What is given up, and when.
+/// Removal of old recordings.
 #[derive(Debug)]
 pub(crate) struct Retention {
     clock: Steady,
-    /// When this run completed which files.
+    /// Completion times of the files of this run.
     completed: BTreeMap<PathBuf, Instant>,
 }
 
@@ -64,14 +65,14 @@ impl Retention {
         }
     }
 
-    /// These files were completed now.
+    /// Records that these files were completed now.
     pub fn complete(&mut self, paths: &[PathBuf]) {
         let now = Instant::now();
         let new = paths.iter().map(|path| (path.clone(), now));
         self.completed.extend(new);
     }
 
-    /// Removes the complete files of the name `of` that are beyond what is to be kept; says which.
+    /// Removes the complete files of the name `of` that exceed the limits of `keep`; returns them.
     pub fn remove_what_is_beyond(
         &mut self,
         keep: &Keep,
@@ -84,13 +85,13 @@ impl Retention {
         self.remove(beyond(keep, &files, Now { clock, ..now }))
     }
 
-    /// Removes the oldest complete file of the name `of`; says which.
+    /// Removes the oldest complete file of the name `of`; returns it.
     pub fn remove_oldest(&mut self, of: &FileName, cell: &str) -> io::Result<Vec<PathBuf>> {
         let files = self.closed(of, cell)?;
         self.remove(files.into_iter().take(1).map(|file| file.path).collect())
     }
 
-    /// The oldest first.
+    /// Complete files, the oldest first.
     fn closed(&self, of: &FileName, cell: &str) -> io::Result<Vec<Closed>> {
         let mut files = Vec::new();
         for path in of.all_like(cell, "")? {
@@ -120,12 +121,12 @@ impl Retention {
     }
 }
 
-/// This host's clock, which is not believed at once when it jumps ahead.
+/// The system clock with delayed trust in jumps ahead.
 #[derive(Debug)]
 struct Steady {
-    /// When it was believed last.
+    /// The last trusted instant.
     last: Now,
-    /// Since when it is not.
+    /// Beginning of the current jump ahead.
     ahead: Option<Instant>,
 }
 
@@ -137,7 +138,7 @@ impl Steady {
         }
     }
 
-    /// The time, as far as it is believed.
+    /// Returns the trusted time.
     fn read(&mut self, now: Now) -> SystemTime {
         let steady = self.last.clock + now.running.saturating_duration_since(self.last.running);
         let jump = now.clock.duration_since(steady).unwrap_or_default();
@@ -145,7 +146,7 @@ impl Steady {
             if self.ahead.is_none() {
                 let hours = jump.as_secs_f64() / 3600.0;
                 tracing::warn!(
-                    "the clock is {hours:.0} h ahead of where it was; for a day no recording is too old (`keep`) by that"
+                    "the clock jumped ahead by {hours:.0} h; for one day `keep` removes no recording because of it"
                 );
             }
             let since = *self.ahead.get_or_insert(now.running);
@@ -158,7 +159,7 @@ impl Steady {
     }
 }
 
-/// Of `files`, the oldest first, those to be removed.
+/// Selects the files to be removed from `files`, which are sorted from the oldest.
 fn beyond(keep: &Keep, files: &[Closed], now: Now) -> Vec<PathBuf> {
     let Some((newest, before)) = files.split_last() else {
         return Vec::new();
@@ -168,7 +169,7 @@ fn beyond(keep: &Keep, files: &[Closed], now: Now) -> Vec<PathBuf> {
         Some(completed) => now.running.saturating_duration_since(completed),
         None => reference.duration_since(file.modified).unwrap_or_default(),
     };
-    // The newest stays whatever its size: there would be nothing else.
+    // The newest file is kept whatever its size; otherwise none might remain.
     let mut mb = newest.bytes as f64 * 1e-6;
     let mut is_full = false;
     let mut gone = Vec::new();
@@ -193,7 +194,7 @@ mod tests {
 
     const DAY: Duration = Duration::from_hours(24);
 
-    /// By the clock of files it is the day 1000.
+    /// Day 1000 by the clock of the files.
     fn today() -> Now {
         Now {
             clock: SystemTime::UNIX_EPOCH + 1000 * DAY,
@@ -201,7 +202,7 @@ mod tests {
         }
     }
 
-    /// Files of 10 MB of other runs that were completed so many days ago.
+    /// Files of 10 MB of other runs, completed these numbers of days ago.
     fn files(days: &[u32]) -> Vec<Closed> {
         let file = |&days: &u32| Closed {
             path: format!("{days}").into(),
@@ -272,7 +273,7 @@ mod tests {
         assert!(gone(at_most_days(30.0), &all, today()).is_empty());
         all.pop();
         assert!(gone(at_most_days(30.0), &all, today()).is_empty());
-        // What this run completed is aged out, too.
+        // Files of this run age, too.
         let later = Now {
             running: today().running + 40 * DAY,
             ..today()
@@ -300,7 +301,7 @@ mod tests {
         assert_eq!(after(5, 0), 5);
         assert_eq!(after(6, 8760), 6);
         assert_eq!(after(20, 8760), 20);
-        // It is set right.
+        // The clock is corrected.
         assert_eq!(after(21, 0), 21);
         assert_eq!(after(22, 8760), 22);
         assert_eq!(after(45, 8760), 45);

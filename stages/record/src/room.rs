@@ -1,5 +1,4 @@
-//! Room on the disk: looked at while recording, so that a disk that fills up is noticed before it is
-//! full.
+//! Free disk space, polled during recording so that a filling disk is noticed before it is full.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,28 +6,28 @@ use std::time::{Duration, Instant};
 
 use tauscope_archive::whole_file;
 
-/// How often the disk is asked.
-/// Resolution: how fast a disk may fill unnoticed, against a call to the system.
+/// Poll interval of the free space.
+/// Resolution: unnoticed filling of the disk, against the cost of a system call.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
-/// Recording that paused goes on at so many times the room at which it pauses.
-/// Resolution: not to begin a file for every few samples.
+/// Ratio of the free space for resuming to that for pausing.
+/// Resolution: hysteresis, so that not every few samples begin a file.
 const AMPLE: f64 = 1.25;
 
-/// How much room a disk has \[bytes\].
+/// Query of the free space of a disk \[bytes\].
 type Ask = fn(&Path) -> io::Result<u64>;
 
-/// The room of the disk that a recorder writes to.
+/// Free space of the disk that a recorder writes to.
 pub(crate) struct Room {
     folder: PathBuf,
     min_free_mb: f64,
     ask: Ask,
     looked: Option<Instant>,
-    /// What was there when it was last looked \[bytes\]; `None` where the file system does not say.
+    /// Free space at the last poll \[bytes\]; `None` if the file system does not report it.
     free_bytes: Option<u64>,
 }
 
 impl Room {
-    /// Of the disk that `folder` lies on, which need not be there yet.
+    /// Creates the check for the disk of `folder`, which need not exist yet.
     pub fn new(folder: PathBuf, min_free_mb: f64) -> Self {
         Self::asked(folder, min_free_mb, whole_file::free_bytes)
     }
@@ -43,8 +42,8 @@ impl Room {
         }
     }
 
-    /// Whether there is enough to go on, with `reserve_bytes` for the end of what is open; more is asked
-    /// of one who `paused`.
+    /// Whether there is enough space to continue, with `reserve_bytes` for completing open files. The required space
+    /// is larger if recording is `paused`.
     pub fn is_enough(&mut self, reserve_bytes: u64, paused: bool) -> bool {
         let due = self.looked.is_none_or(|at| at.elapsed() >= LOOK_EVERY);
         if due {
@@ -55,13 +54,13 @@ impl Room {
         self.free_mb().is_none_or(|free_mb| free_mb >= needed_mb)
     }
 
-    /// Looks now.
+    /// Polls now.
     pub fn look(&mut self) {
         self.looked = Some(Instant::now());
         self.free_bytes = (self.ask)(&self.folder).ok();
     }
 
-    /// What was there when it was last looked \[MB\].
+    /// Free space at the last poll \[MB\].
     pub fn free_mb(&self) -> Option<f64> {
         self.free_bytes.map(|bytes| bytes as f64 * 1e-6)
     }

@@ -1,18 +1,18 @@
-//! A clock of reception that is set back.
+//! Detection of a reception clock that is set back.
 
 use crate::streams::Streams;
 
-/// A time of reception that is so far below the one before in its stream is of a clock that was set back \[ns\].
-/// Resolution: what is left in order comes within less.
+/// Decrease of the reception time within a stream above which the clock was set back \[ns\].
+/// Resolution: reordering without a clock step stays below this.
 const SET_BACK_NS: i64 = 1_000_000_000;
 
-/// Notices that the clock was set back. Each stream is compared with itself: one of another host comes late behind a
-/// network that was cut, and its clock is as it was.
+/// Detector of a clock that was set back. Each stream is compared only with itself: after a network failure a stream
+/// of another host may be late although no clock was set back.
 #[derive(Debug)]
 pub(crate) struct SetBack {
-    /// By stream: when its newest sample was received \[ns since the epoch\], and how often the clock was set back by then.
+    /// Reception time of the newest sample \[ns since the epoch\] and number of clock steps in the stream, by stream.
     newest: Vec<(Option<i64>, u64)>,
-    /// The most of those.
+    /// Largest number of clock steps in a stream.
     times: u64,
 }
 
@@ -24,8 +24,8 @@ impl SetBack {
         }
     }
 
-    /// Notes when a sample of the stream number `index` was received. Where that is the first to tell that the clock was
-    /// set back, by how much \[ns\].
+    /// Records the reception time of a sample of the stream number `index`. Returns the size of a clock step \[ns\]
+    /// when the first stream shows it.
     pub fn note(&mut self, index: usize, received_ns: i64) -> Option<i64> {
         let (newest_ns, times) = self.newest.get_mut(index)?;
         let before_ns = newest_ns.replace(received_ns).unwrap_or(received_ns);

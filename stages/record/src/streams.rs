@@ -1,4 +1,4 @@
-//! What a recorder listens to, and the topic each stream gets.
+//! Input streams of a recorder and their topics.
 
 use std::collections::BTreeMap;
 
@@ -7,27 +7,27 @@ use tauscope_dynamics::Model;
 
 use crate::error::RecordError;
 
-/// What a recorder must know of a cell.
+/// Properties of a cell that a recorder needs.
 #[derive(Debug, Clone)]
 pub struct CellInfo {
     /// Its name.
     pub name: String,
     /// Its joints, in URDF order.
     pub joint_names: Vec<String>,
-    /// Its robot, where there is one: for the moving picture.
+    /// Its robot, if there is one, for the picture.
     pub model: Option<Model>,
     /// Unit of its efforts, `Nm` or `A`.
     pub effort_unit: String,
 }
 
 impl CellInfo {
-    /// The frame of the robot's root link, which is the world's.
+    /// Name of the robot's root link, whose frame is the world frame.
     pub(crate) fn root(&self) -> &str {
         self.model.as_ref().map_or("world", root)
     }
 }
 
-/// The name of the link whose frame is the world's.
+/// Name of the link whose frame is the world frame.
 pub(crate) fn root(model: &Model) -> &str {
     let root = model.links().iter().find(|link| link.parent.is_none());
     root.map_or("world", |link| &link.name)
@@ -40,11 +40,11 @@ pub struct StreamInfo {
     pub stage: String,
     /// The cell it belongs to.
     pub cell: String,
-    /// What it carries. Its stage's health may come along.
+    /// Sample type; health reports of the stage may be mixed in.
     pub kind: SampleKind,
-    /// The detector that speaks in it, where that is known.
+    /// The detector that emits it, if known.
     pub detector: Option<String>,
-    /// What its scores are measured in; empty for nothing, and where that is not known.
+    /// Unit of its scores; empty if there are none or the unit is unknown.
     pub score_unit: String,
 }
 
@@ -54,9 +54,9 @@ pub(crate) struct Stream {
     pub stage: String,
     pub cell: usize,
     pub kind: SampleKind,
-    /// What tells it from its like in the cell: the detector, or else the stage.
+    /// Unique label within the cell: the detector, or else the stage.
     pub label: String,
-    /// What a detector's scores are measured in; empty for nothing, and where that is not known.
+    /// Unit of a detector's scores; empty if there are none or the unit is unknown.
     pub score_unit: String,
     /// Topic of the effort, the twin's effort or the detections; see [`Streams`].
     pub topic: String,
@@ -64,9 +64,9 @@ pub(crate) struct Stream {
 
 /// All streams, by name, with their topics.
 ///
-/// Topics are those of the contract. With more than one cell each begins with `/<cell>`; where a
-/// cell has several streams of one kind, the stage's name is appended (`/residual/<stage>`), and of
-/// each detector the label is: its name, or the stage's where two stages run the same detector.
+/// The topics are those of `docs/archive.md`. With more than one cell, each begins with `/<cell>`. If a cell has
+/// several streams of one kind, the stage's name is appended (`/residual/<stage>`). For detectors the label is
+/// appended: the name of the detector, or of the stage if two stages run the same detector.
 #[derive(Debug)]
 pub(crate) struct Streams {
     pub cells: Vec<CellInfo>,
@@ -153,7 +153,7 @@ impl Streams {
         Ok(result)
     }
 
-    /// What the topics of a cell begin with: nothing, or `/<cell>` where there are several.
+    /// Prefix of a cell's topics: empty, or `/<cell>` if there are several cells.
     pub fn prefix(&self, cell: usize) -> String {
         if self.cells.len() > 1 {
             format!("/{}", self.cells[cell].name)
@@ -162,15 +162,15 @@ impl Streams {
         }
     }
 
-    /// The residual's topic of a twin's stream.
+    /// Topic of the residual of a twin's stream.
     pub fn residual_topic(&self, stream: &Stream) -> String {
         let prefix = self.prefix(stream.cell);
         let suffix = stream.topic[prefix.len()..].trim_start_matches("/twin/joint_states");
         format!("{prefix}/residual{suffix}")
     }
 
-    /// The topic of the force that a detector estimates: `/external_wrench` for the cell's first
-    /// detector, and with the label appended for each other.
+    /// Topic of the force that a detector estimates: `/external_wrench` for the cell's first detector, with the label
+    /// appended for the others.
     pub fn wrench_topic(&self, stream: &Stream) -> String {
         let mut of_cell = self
             .all
@@ -183,10 +183,10 @@ impl Streams {
         }
     }
 
-    /// The stream that a sample of the stage `from` belongs to.
+    /// Returns the index of the stream that a sample of the stage `from` belongs to.
     ///
     /// # Errors
-    /// If nobody announced it, or announced something else.
+    /// If the stream was not announced, or was announced with another type.
     pub fn find(&self, from: &str, sample: &SampleRef<'_>) -> Result<usize, RecordError> {
         let Some(&index) = self.by_stage.get(from) else {
             return Err(RecordError::UnknownStream {

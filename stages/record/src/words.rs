@@ -1,12 +1,12 @@
-//! What a detection says in words, the same in the archive and in the picture.
+//! Texts about detections, shared by the archive and the picture.
 
 use tauscope_bus::{Contact, Detection, flags};
 use tauscope_dynamics::terms::UNKNOWN;
 
-/// How serious it is.
+/// Severity of a detection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Severity {
-    /// All is well.
+    /// No contact and no change.
     Ok,
     /// A contact, or a change of the arm.
     Contact,
@@ -27,7 +27,7 @@ impl Severity {
     }
 }
 
-/// The joints that detected (bit j for joint j), by name.
+/// Names of the joints that detected (bit j for joint j).
 pub(crate) fn loaded_joints(bits: u32, joints: &[String]) -> Vec<&str> {
     let loaded = |j: &usize| bits & (1 << j) != 0;
     (0..joints.len().min(32))
@@ -53,7 +53,7 @@ pub(crate) fn headline(detection: &Detection) -> String {
     }
 }
 
-/// What it means that an alarm ended: a contact is over, a change of the arm was learned.
+/// Text for the end of an alarm: a contact has ended, or a change of the arm was learnt.
 pub(crate) fn over(ended: &Contact) -> String {
     if ended.size.is_some() {
         return "learned: the rule from now on".to_owned();

@@ -1,4 +1,4 @@
-//! What the recorder archives is what it was given, and nothing else.
+//! The recorder archives exactly its input.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 #![allow(clippy::float_cmp, reason = "the archive keeps every bit")]
@@ -136,7 +136,7 @@ fn a_detection_is_told_once_when_it_begins_and_once_when_it_ends() {
     let contact_ns = format!("{seconds}{nanoseconds}").parse::<i64>().unwrap();
     assert_eq!(contact_ns, detection.contact_ns);
 
-    // Its end tells the whole contact, a number a key.
+    // The status at the end describes the whole contact, one number per key.
     let values = values_of(3);
     assert_eq!((values["event"], values["state"]), ("offset", "free"));
     assert_eq!((values["estimate"], values["kind"]), ("final", "contact"));
@@ -173,7 +173,7 @@ fn what_happens_during_a_mute_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("demo.mcap");
     let mut instants = motion(5.0);
-    // It begins two samples before the contact and is over before the contact is.
+    // The mute begins two samples before the contact and ends before the contact does.
     let is_onset = |i: &Instant| i.detection.event == Detection::ONSET;
     let onset = instants.iter().position(is_onset).unwrap();
     instants[onset - 2].state.command = Command {
@@ -213,7 +213,7 @@ fn what_was_not_measured_stays_empty() {
 fn command_and_tool_are_kept_when_they_change_and_a_command_now_and_then() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("demo.mcap");
-    // 0.4 s; the command changes after 0.04 s, the tool comes after 0.1 s and goes after 0.2 s.
+    // 0.4 s; the command changes after 0.04 s, the tool is attached after 0.1 s and detached after 0.2 s.
     let mut instants = motion(0.4);
     for (k, instant) in instants.iter_mut().enumerate() {
         let state = &mut instant.state;
@@ -244,7 +244,7 @@ fn command_and_tool_are_kept_when_they_change_and_a_command_now_and_then() {
 #[test]
 fn the_same_samples_give_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
-    // One name, because it stands in the bag's metadata.
+    // Both files have one name, because the bag's metadata contains it.
     let paths = ["a", "b"].map(|below| folder.path().join(below).join("demo.mcap"));
     let instants = motion(4.0);
     let [a, b] = paths.map(|path| {

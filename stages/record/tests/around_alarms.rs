@@ -1,4 +1,4 @@
-//! Around each alarm a file of its own, with what came before it.
+//! A separate file around each alarm, including the samples before it.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -10,7 +10,7 @@ use tauscope_archive::Recording;
 use tauscope_bus::Sink;
 use tauscope_record::{AroundAlarms, Config, Recorder};
 
-/// Around the alarms of ten seconds with two pushes: at 3.0 to 4.2 s and at 7.0 to 7.8 s.
+/// Records the alarms of a motion with two pushes: at 3.0 to 4.2 s and at 7.0 to 7.8 s.
 fn record(folder: &Path, around: AroundAlarms) -> Vec<PathBuf> {
     record_all(folder, around, &motion(12.0))
 }
@@ -36,7 +36,7 @@ fn record_all(folder: &Path, around: AroundAlarms, instants: &[Instant]) -> Vec<
     files
 }
 
-/// From the first to the last joint state \[s since the start\], and whether there is one for each step.
+/// Times of the first and the last joint state \[s since the start\], and whether none is missing in between.
 fn span(file: &Path) -> (f64, f64, bool) {
     let recording = Recording::open(file).unwrap();
     assert!(recording.damage().is_empty(), "{}", file.display());
@@ -81,7 +81,7 @@ fn a_clock_that_is_set_back_costs_no_file_and_no_sample() {
         after_s: 0.5,
         ..AroundAlarms::default()
     };
-    // Before the first alarm, within the time before it, while it lasts, and behind it.
+    // Before the first alarm, in its recorded time before, during the alarm, and after it.
     for set_back_s in [1.5, 2.8, 3.5, 4.4] {
         let mut instants = motion(12.0);
         let first = (set_back_s * 1e9) as usize / STEP_NS as usize;
@@ -102,7 +102,7 @@ fn a_clock_that_is_set_back_costs_no_file_and_no_sample() {
         let spans: Vec<_> = files.iter().map(|file| span(file)).collect();
         let folder = tempfile::tempdir().unwrap();
         let files = record(folder.path(), around());
-        // Where the clock was set back within a file, another one begins.
+        // A clock step within a file begins a new file.
         let mut expected = Vec::new();
         for (begin_s, end_s, _) in files.iter().map(|file| span(file)) {
             if (begin_s..end_s).contains(&set_back_s) {

@@ -1,4 +1,4 @@
-//! What is written of an explanation can be read back, whatever was found.
+//! The picture of an explanation can be read back for all kinds of findings.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -161,7 +161,7 @@ fn the_file_holds_efforts_residuals_events_text_and_layout() {
     assert_eq!(rows(&recording["/rec_00/log"]), 2);
     assert!(!recording.contains_key("/rec_04/events/1"));
     assert!(blueprint.iter().any(|path| path.starts_with("/view/")));
-    // Six links, every 20 ms, on the timeline that the picture opens on.
+    // Six links, every 20 ms, on the initial timeline of the picture.
     let moved = &recording["/transforms"];
     assert_eq!(rows(moved), 6 * 500);
     let moved = moved.iter().find(|chunk| !chunk.is_static()).unwrap();

@@ -1,4 +1,4 @@
-//! Files are named, split and kept as the recorder was told, and each stands for itself.
+//! Files are named, split and kept according to the settings, and each file is self-contained.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -67,7 +67,7 @@ fn files_are_split_by_time_and_lose_nothing() {
         .iter()
         .map(|file| count::<JointState>(file, "/joint_states"));
     assert_eq!(states.sum::<usize>(), motion(5.0).len());
-    // The threshold never changes; still each file tells it.
+    // The threshold never changes, but each file must contain it.
     for file in &names {
         let threshold = "/detections/twin_regression/threshold";
         assert_eq!(count::<Float64>(file, threshold), 1, "{}", file.display());
@@ -88,7 +88,7 @@ fn reports_of_stages_that_are_ahead_split_nothing() {
     };
     let mut recorder = recorder(&config).unwrap();
     let motion = motion(5.0);
-    // The source has read all of the file before the recorder has taken its first sample.
+    // The source has read the whole file before the recorder receives its first sample.
     for health in motion.iter().filter_map(|instant| instant.health.as_ref()) {
         let sample = SampleRef::Health(health);
         recorder.accept("twin", sample).unwrap();
@@ -230,11 +230,11 @@ fn a_clock_that_is_set_back_begins_another_file_and_a_stream_that_is_late_does_n
     let counts: Vec<usize> = spans.iter().map(|(_, count)| *count).collect();
     assert_eq!(counts, [250, 250]);
     assert!(spans.iter().all(|(ns, _)| *ns < 2_000_000_000), "{spans:?}");
-    // Behind a network that was cut, what another host tells is of long ago.
+    // After a network failure, samples of another host are old.
     assert_eq!(record(true).len(), 1);
 }
 
-/// What a recorder leaves that is killed: the file as it is in the middle of writing.
+/// Writes an unfinished file as a killed recorder leaves it.
 fn torn_copy(path: &Path, seconds: f64) {
     let folder = tempfile::tempdir().unwrap();
     let whole = Config {
@@ -379,7 +379,7 @@ fn recordings_are_not_old_because_nothing_was_recorded_since() {
     let mut begun = recorder(&config).unwrap();
     assert!(at("a-002.mcap").exists() && at("a-003.mcap").exists());
     assert!(!at("a-001.mcap").exists());
-    // Once there is a newer one, they are.
+    // They are removed once there is a newer file.
     for instant in &motion(1.0) {
         instant.feed(&mut begun, "");
     }
@@ -397,7 +397,7 @@ fn a_disk_without_room_pauses_the_recording_and_what_it_loses_is_counted() {
     let folder = tempfile::tempdir().unwrap();
     let config = Config {
         mcap: Some(folder.path().join("a.mcap")),
-        // No disk has so much.
+        // Larger than any disk.
         min_free_mb: 1e15,
         ..Config::default()
     };
@@ -423,7 +423,7 @@ fn a_kill_costs_no_more_than_a_tenth_of_a_second() {
     for instant in &motion {
         instant.feed(&mut recorder, "");
     }
-    // What the operating system has been given is what a killed process leaves.
+    // A killed process leaves the data that was passed to the operating system.
     let left = folder.path().join("left.mcap.part");
     std::fs::copy(folder.path().join("a.mcap.part"), &left).unwrap();
     let end_ns = Recording::open(&left).unwrap().end_ns().unwrap();

@@ -1,4 +1,4 @@
-//! One program of the tests through the public face: linking one is what takes long.
+//! All tests of the public API in one program, because linking dominates the build time.
 
 mod archive;
 mod around_alarms;

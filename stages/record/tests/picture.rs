@@ -1,4 +1,4 @@
-//! What the recorder draws can be read back, and a viewer that is not there costs nothing.
+//! The picture can be read back, and a missing viewer has no effect.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -52,7 +52,7 @@ fn read(path: &Path) -> (BTreeMap<String, Vec<Chunk>>, BTreeSet<String>) {
     (recording, blueprint)
 }
 
-/// All that the blueprint says, as text.
+/// The whole blueprint as text.
 fn blueprint_text(path: &Path) -> String {
     let reader = BufReader::new(File::open(path).unwrap());
     let mut text = String::new();
@@ -121,7 +121,7 @@ fn the_file_holds_efforts_robot_and_detections_on_the_importers_paths_and_timeli
     );
     assert_eq!(rows(&recording["/residual/effort"]), 1050);
     assert_eq!(rows(&recording["/detections/twin_regression/score"]), 1050);
-    // Not ready, free, contact, free; and each again while it lasts, once a second.
+    // Not ready, free, contact, free; each one repeated once per second.
     assert_eq!(rows(&recording["/detections/twin_regression/state"]), 7);
     assert_eq!(rows(&recording["/detections/twin_regression/events"]), 2);
     // Eight links, fifty times a second.
@@ -129,7 +129,7 @@ fn the_file_holds_efforts_robot_and_detections_on_the_importers_paths_and_timeli
     for link in 0..8 {
         assert!(rows(&recording[&format!("/robot/link{link}")]) >= 5);
     }
-    // Sent in columns, not sample by sample.
+    // Sent in columns, not per sample.
     assert!(recording["/joint_states/effort"].len() < 5);
 
     let effort = recording["/joint_states/effort"]
@@ -248,7 +248,7 @@ fn two_cells_lie_side_by_side() {
 
 #[test]
 fn a_viewer_that_is_not_there_neither_blocks_nor_fills_memory_nor_holds_up_the_end() {
-    // A port on which nobody listens.
+    // A port without a listener.
     let port = std::net::TcpListener::bind("127.0.0.1:0")
         .unwrap()
         .local_addr()
@@ -261,7 +261,7 @@ fn a_viewer_that_is_not_there_neither_blocks_nor_fills_memory_nor_holds_up_the_e
     };
     let cells = [cell("demo", Some(arm(false)))];
     let mut recorder = recorder(rerun, &cells, &streams("demo", "")).unwrap();
-    // More messages than the queue takes.
+    // More messages than the capacity of the queue.
     let instants = motion(12.0);
     for instant in &instants {
         instant.feed(&mut recorder, "");

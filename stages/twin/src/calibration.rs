@@ -9,18 +9,19 @@ use tauscope_dynamics::effort_scale::{self, Slope};
 
 use crate::twin_file::TwinFile;
 
-/// A joint faster than this moves: no encoder's noise is as much \[rad/s, m/s\].
+/// Speed above which a joint is moving \[rad/s, m/s\].
 /// Physical: above the velocity noise of encoders.
 const MOVES: f64 = 0.03;
-/// The arm must move in so large a share of the samples if they are to tell a gain.
+/// Minimum share of samples in motion for a gain to be identifiable.
 /// Tuned: not swept.
 const LEAST_MOVING: f64 = 0.01;
 
-/// A line that explains less of the measured effort's variance tells no gain: friction outweighs what the model knows.
+/// Minimum share of the measured effort's variance that a line must explain for its slope to be used as the gain.
+/// Below it, friction outweighs the modelled effort.
 /// Tuned: not swept.
 const LEAST_EXPLAINED: f64 = 0.05;
 
-/// A joint whose model effort varies by more than this bears weight \[N m\].
+/// Standard deviation of the model effort above which a joint carries weight \[N m\].
 /// Physical: a hand of 1 kg at 10 cm.
 const BEARS_WEIGHT: f64 = 1.0;
 
@@ -31,7 +32,7 @@ pub struct JointFit {
     pub gain: f64,
     /// Offset \[effort unit\].
     pub offset: f64,
-    /// Standard deviation of what the fit leaves \[effort unit\].
+    /// Standard deviation of the fit's residual \[effort unit\].
     pub noise: f64,
     /// Share of the measured effort's variance that the line explains, 0 to 1.
     pub explained: f64,
@@ -41,7 +42,7 @@ pub struct JointFit {
     pub measured: f64,
 }
 
-/// Running sums of one joint, about the first sample for numerical sanity (Welford).
+/// Running means and central moments of one joint (Welford's algorithm).
 #[derive(Debug, Clone, Copy, Default)]
 struct Moments {
     mean_x: f64,
@@ -55,15 +56,15 @@ struct Moments {
 #[derive(Debug, Clone)]
 pub struct Calibration {
     joints: Vec<Moments>,
-    /// Whether efforts and model are in one unit, so that a gain nobody tells is about 1.
+    /// Whether measured and model efforts have the same unit; an unidentifiable gain is then 1.
     alike: bool,
     samples: u64,
     moving: u64,
 }
 
 impl Calibration {
-    /// An empty regression for this many joints; `alike` if efforts and model are in one unit, so that a gain that the recordings do not tell
-    /// is better taken for 1.
+    /// Creates an empty regression for `joint_count` joints. `alike` states that measured and model efforts have the
+    /// same unit, so that a gain that the recordings do not identify is set to 1.
     pub fn new(joint_count: usize, alike: bool) -> Self {
         Self {
             joints: vec![Moments::default(); joint_count],
@@ -73,12 +74,12 @@ impl Calibration {
         }
     }
 
-    /// How many samples were taken.
+    /// Returns the number of samples in the regression.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// Takes one sample of the uncorrected twin; one that is not [`flags::READY`] is passed over.
+    /// Adds a sample of the uncorrected twin; samples without [`flags::READY`] are skipped.
     pub fn add(&mut self, sample: &TwinState) {
         if !sample.header.has(flags::READY) {
             return;
@@ -101,11 +102,12 @@ impl Calibration {
         }
     }
 
-    /// The fit per joint, or nothing from fewer than two samples.
+    /// Returns the fit per joint, or `None` for fewer than two samples.
     ///
-    /// A joint whose model effort does not vary keeps gain 1 and is only offset: no motion, no gain. So do all joints of an arm that stands, if
-    /// efforts and model are in one unit: what static friction holds differs from pose to pose by more than what a gain could be told by. And so
-    /// does a joint whose friction hides the model, in one unit, too.
+    /// A joint whose model effort does not vary keeps gain 1 and gets only an offset. If measured and model efforts
+    /// have the same unit, two further cases keep gain 1:
+    /// - all joints of an arm at standstill, because the variation of static friction between poses masks any gain;
+    /// - a joint whose friction masks the modelled effort.
     pub fn fit(&self) -> Option<Vec<JointFit>> {
         if self.samples < 2 {
             return None;
@@ -139,7 +141,7 @@ impl Calibration {
     }
 }
 
-/// The slopes in a twin file of the joints whose line explains most of the measured effort.
+/// Returns the slopes in a twin file of the joints whose line explains most of the measured effort.
 pub fn telling_slopes_of(file: &TwinFile) -> Vec<Slope> {
     let joints = file.joints.iter();
     let telling =
@@ -152,8 +154,8 @@ pub fn telling_slopes_of(file: &TwinFile) -> Vec<Slope> {
         .collect()
 }
 
-/// The slopes that tell the unit of the effort: those of joints whose line explains most of it. `fits` are by
-/// joint in the order of `names`.
+/// Returns the slopes of the joints whose line explains most of the measured effort; they identify its unit. `fits`
+/// are by joint in the order of `names`.
 pub fn telling_slopes(names: &[String], fits: &[JointFit]) -> Vec<Slope> {
     let telling = |fit: &JointFit| fit.explained >= effort_scale::TELLING;
     let named = names.iter().zip(fits);
@@ -166,9 +168,9 @@ pub fn telling_slopes(names: &[String], fits: &[JointFit]) -> Vec<Slope> {
     slopes.collect()
 }
 
-/// How much the measured efforts vary for each unit that the model's vary, of the middle joint among those that bear
-/// weight. A torque varies at least as much as the weight makes it, whatever friction adds; so this tells a current
-/// also where friction hides every slope.
+/// Returns the ratio of the standard deviations of measured and model effort: the median over the joints that carry
+/// weight. A measured torque varies at least as much as gravity makes it vary, whatever friction adds. So a small
+/// ratio identifies a motor current even where friction masks every slope.
 pub fn spread_scale(fits: &[JointFit]) -> Option<f64> {
     let bears = fits.iter().filter(|fit| fit.excitation > BEARS_WEIGHT);
     let mut ratios: Vec<f64> = bears.map(|fit| fit.measured / fit.excitation).collect();

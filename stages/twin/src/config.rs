@@ -7,26 +7,28 @@ use serde::{Deserialize, Serialize};
 
 use crate::twin_file::Filters;
 
-/// A twin: what the effort should have been.
+/// A digital twin, which computes the effort that the robot's motion requires.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
     /// The corrected twin that `tauscope calibrate` or `tauscope explain` wrote (`twin.yaml`). Without
-    /// it the twin is the rigid-body model as the URDF has it.
+    /// it the twin is the uncorrected rigid-body model of the URDF.
     pub model: Option<PathBuf>,
     /// The motion whose effort is computed.
     pub motion: Motion,
-    /// Where the expected effort comes from.
+    /// Source of the expected effort.
     pub expected: Expected,
-    /// Low-pass on the velocity before it is differentiated to the acceleration \[Hz\]; without it that of the `model`, else 12.
+    /// Cutoff of the low-pass on the velocity before it is differentiated to the acceleration \[Hz\]. Default: that
+    /// of the `model`, else 12.
     #[schemars(range(min = 0.01, max = 10_000.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub velocity_cutoff_hz: Option<f64>,
-    /// The same low-pass on measured and expected effort \[Hz\], whose difference is the residual; without it that of the `model`, else 4.5.
+    /// Cutoff of the low-pass on both measured and expected effort \[Hz\]; the residual is the difference of the
+    /// filtered efforts. Default: that of the `model`, else 4.5.
     #[schemars(range(min = 0.01, max = 10_000.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub effort_cutoff_hz: Option<f64>,
-    /// A gap between two samples longer than this starts the filters anew \[s\].
+    /// Gap between two samples above which the filters are reset \[s\].
     #[schemars(range(min = 0.001, max = 3600.0))]
     pub max_gap_s: f64,
 }
@@ -45,7 +47,7 @@ impl Default for Config {
 }
 
 impl Config {
-    /// The low-passes: what is given, and what is not as the `model` has it.
+    /// Returns the low-pass cutoffs: those set here, else those of the `model`, else the defaults.
     pub fn filters(&self, model: Option<Filters>) -> Filters {
         let made_with = model.unwrap_or_default();
         Filters {
@@ -54,7 +56,7 @@ impl Config {
         }
     }
 
-    /// The same, with these low-passes given.
+    /// Returns this configuration with the given low-pass cutoffs.
     #[must_use]
     pub fn with(self, filters: Filters) -> Self {
         Self {
@@ -79,14 +81,14 @@ pub enum Motion {
     Commanded,
 }
 
-/// Where the expected effort comes from.
+/// Source of the expected effort.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Expected {
-    /// From the robot's rigid-body model.
+    /// The robot's rigid-body model.
     #[default]
     Model,
-    /// From somebody else's twin, whose effort the source reads from a topic.
+    /// An external twin, whose effort the source reads from a topic.
     Topic,
 }
 

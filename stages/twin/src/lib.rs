@@ -1,8 +1,9 @@
-//! The digital twin as a stage: it computes the effort that a robot's motion requires, and the residual of the measured effort.
+//! The digital twin as a stage: it computes the effort that a robot's motion requires, and the residual of the
+//! measured effort.
 //!
-//! The twin is the robot's rigid-body model (or a topic, where somebody else's simulation computes
-//! the effort), corrected by what a calibration learnt from contact-free recordings: Tajiri and
-//! Iwamoto, "Collision Detection for Robot Arm Assisted with Digital Twin System", equations 3 and 4.
+//! The twin is the robot's rigid-body model, or a topic on which an external simulation publishes the effort. It is
+//! corrected by a calibration on contact-free recordings: Tajiri and Iwamoto, "Collision Detection for Robot Arm
+//! Assisted with Digital Twin System", equations 3 and 4.
 //!
 //! ```
 //! use tauscope_bus::{Header, JointState, LinkError, Stage, TwinState};

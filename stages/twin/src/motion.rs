@@ -5,12 +5,12 @@ use tauscope_dynamics::derivative::FilteredDerivative;
 
 use crate::config::Motion;
 
-/// Follows one of the motions and differentiates it once more.
+/// Tracks the selected motion and differentiates its velocity.
 #[derive(Debug)]
 pub(crate) struct MotionTracker {
     motion: Motion,
     acceleration_filters: Vec<FilteredDerivative>,
-    /// The velocity of the sample before, for the trapezoid rule.
+    /// Velocity of the previous sample, for the trapezoidal rule.
     previous_velocity: JointArray,
     pub position: JointArray,
     pub velocity: JointArray,
@@ -29,19 +29,19 @@ impl MotionTracker {
         }
     }
 
-    /// Time after a reset from which on the acceleration can be trusted \[s\].
+    /// Returns the time from a reset until the acceleration is valid \[s\].
     pub fn settling_time_s(&self) -> f64 {
         self.acceleration_filters
             .first()
             .map_or(0.0, FilteredDerivative::settling_time_s)
     }
 
-    /// Whether the sample holds the motion that is followed.
+    /// Returns whether the sample contains the tracked motion.
     pub fn knows(&self, sample: &JointState) -> bool {
         self.motion != Motion::Commanded || sample.header.has(flags::COMMAND)
     }
 
-    /// Begins anew at this sample, at rest in acceleration.
+    /// Restarts at this sample with zero acceleration.
     pub fn reset(&mut self, sample: &JointState) {
         let (position, velocity) = self.source(sample);
         self.position = *position;
@@ -53,7 +53,7 @@ impl MotionTracker {
         }
     }
 
-    /// Goes on by `dt_s`; a repeated stamp (0) leaves the acceleration as it was.
+    /// Advances by `dt_s`; a repeated stamp (0) leaves the acceleration unchanged.
     pub fn update(&mut self, dt_s: f64, sample: &JointState) {
         let (position, velocity) = self.source(sample);
         let (position, velocity) = (*position, *velocity);

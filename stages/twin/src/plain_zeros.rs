@@ -2,20 +2,20 @@
 
 use tauscope_bus::{JointArray, MAX_JOINTS};
 
-/// A joint of which more than this share of its largest measured effort is expected does bear something.
-/// Physical: sensors of arms are good to a few per cent of what they measure, and never exactly zero there.
+/// Share of a joint's largest measured effort; a joint whose expected effort exceeds it is loaded.
+/// Physical: effort sensors of arms are accurate to a few per cent and never read exactly zero under load.
 const BEARS: f64 = 0.1;
 
-/// Tells zeros that are a measurement from zeros that stand for none. Brakes that hold the arm and drives that are off
-/// give such zeros, too.
+/// Distinguishes measured zeros from zeros that stand for a missing measurement. Brakes that hold the arm and drives
+/// that are off give the latter, too.
 #[derive(Debug, Default)]
 pub(crate) struct PlainZeros {
-    /// The largest effort measured so far, by joint, in the measured effort's unit.
+    /// Largest effort measured so far, by joint, in the measured effort's unit.
     largest: JointArray,
 }
 
 impl PlainZeros {
-    /// Whether all efforts are exactly zero although a joint bears something: then they measure nothing.
+    /// Returns whether all efforts are exactly zero although a joint is loaded: then they are no measurement.
     pub fn are(&mut self, effort: &[f64], expected: &[f64]) -> bool {
         debug_assert!(effort.len() <= MAX_JOINTS);
         if effort.iter().any(|effort| *effort != 0.0) {

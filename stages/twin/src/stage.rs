@@ -11,11 +11,11 @@ use crate::motion::MotionTracker;
 use crate::plain_zeros::PlainZeros;
 use crate::twin_file::Correction;
 
-/// A pause this long begins another recording, with motors that may have cooled; a shorter one is a gap \[ns\].
-/// Physical: drives cool in minutes, and drivers and networks come back in seconds.
+/// Minimum pause between two recordings, after which the motors may have cooled; a shorter one is a gap \[ns\].
+/// Physical: drives cool in minutes, whereas drivers and networks reconnect within seconds.
 const PAUSE_NS: i64 = 60_000_000_000;
 
-/// What the twin must know of its cell.
+/// Facts about the cell that the twin needs.
 #[derive(Debug, Clone)]
 pub struct Setup {
     /// The robot; may be absent where the expected effort comes from a topic.
@@ -24,28 +24,28 @@ pub struct Setup {
     pub joint_names: Vec<String>,
     /// Torque constants by joint \[N m/A\], where the effort is a current and they are known.
     pub torque_constants_nm_per_a: Option<Vec<f64>>,
-    /// The link a tool is attached to, where the source tells of one.
+    /// Link to which a tool is attached, where the source reports one.
     pub tool_link: Option<usize>,
 }
 
-/// Why a twin cannot be built.
+/// Reason why a twin cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum TwinError {
-    /// There is no model to compute the effort from.
+    /// No model from which to compute the effort.
     #[error(
         "the cell has no robot: give `robot: <URDF>`, or `expected: topic` if another twin's effort is recorded"
     )]
     NoModel,
-    /// The sample type has no room for so many joints.
+    /// More joints than a sample can hold.
     #[error("{found} joints, at most {MAX_JOINTS} are supported")]
     TooManyJoints {
-        /// How many there are.
+        /// Number of joints.
         found: usize,
     },
-    /// One of the terms of the correction cannot be built.
+    /// A term of the correction that cannot be built.
     #[error(transparent)]
     Term(#[from] TermError),
-    /// A term that changes what bodies cost, in a robot that is not known.
+    /// A term that changes the effort of the bodies, without a robot model.
     #[error("the twin's `{effect}` needs the robot: give `robot: <URDF>`")]
     UnknownBodies {
         /// The effect.
@@ -53,7 +53,7 @@ pub enum TwinError {
     },
 }
 
-/// The twin stage. Pure: the same samples in give the same samples out.
+/// The twin stage. It is deterministic: equal input samples give equal output samples.
 #[derive(Debug)]
 pub struct Twin {
     expected: Expected,
@@ -70,22 +70,21 @@ pub struct Twin {
     plain_zeros: PlainZeros,
     measured_filters: Vec<Butterworth2>,
     expected_filters: Vec<Butterworth2>,
-    /// Stamp of the sample before, and of the last reset.
+    /// Stamp of the previous sample, and of the last reset.
     previous_ns: Option<i64>,
     reset_ns: i64,
-    /// The newest stamp, and where the recording begins.
+    /// Newest stamp, and first stamp of the recording.
     last_ns: Option<i64>,
     recording_ns: i64,
-    /// The first stamp of all: where the session begins.
+    /// First stamp of the session.
     start_ns: Option<i64>,
 }
 
 impl Twin {
-    /// A twin for a cell; `correction` in the cell's joint order.
+    /// Creates a twin for a cell; `correction` is in the cell's joint order.
     ///
     /// # Errors
-    /// If it needs a model and there is none, there are too many joints, or a term of the correction does
-    /// not fit the robot.
+    /// If a required model is missing, there are too many joints, or a term of the correction does not fit the robot.
     pub fn new(config: &Config, setup: Setup, correction: Correction) -> Result<Self, TwinError> {
         let joint_count = setup.joint_names.len();
         if joint_count > MAX_JOINTS {
@@ -131,12 +130,12 @@ impl Twin {
         })
     }
 
-    /// How long the filters take to settle after the start or a gap \[s\].
+    /// Returns the settling time of the filters after the start or a gap \[s\].
     pub fn settling_time_s(&self) -> f64 {
         self.settling_time_s
     }
 
-    /// Attaches the tool that the sample tells of, if it is another than before.
+    /// Attaches the tool that the sample reports, if it differs from the current one.
     fn follow_tool(&mut self, sample: &JointState) -> Result<(), StageError> {
         let (Some((model, _)), Some(link)) = (&mut self.model, self.tool_link) else {
             return Ok(());
@@ -160,14 +159,14 @@ impl Twin {
         });
         model.set_tool(link, inertia);
         if !self.physics.bodies().is_empty() {
-            // A tilted base or an elastic joint bears the tool as well.
+            // A tilted base or an elastic joint carries the tool as well.
             self.physics =
                 Physics::build(&self.correction.terms, model).map_err(StageError::failed)?;
         }
         Ok(())
     }
 
-    /// Where the recording begins: a short gap makes no motor cold.
+    /// Updates the start of the recording. A short gap does not start a new one, because the motors stay warm.
     fn follow_recording(&mut self, stamp_ns: i64) {
         let since_last = self.last_ns.map(|last| stamp_ns - last);
         if !since_last.is_some_and(|ns| (0..PAUSE_NS).contains(&ns)) {
@@ -176,11 +175,11 @@ impl Twin {
         self.last_ns = Some(stamp_ns);
     }
 
-    /// Expected effort of the motion as it stands, in the measured effort's unit; not filtered.
+    /// Returns the expected effort of the current motion in the measured effort's unit, unfiltered.
     ///
     /// `expected = record(gain * bodies(rigid) + joints) / torque constant + offset`, where bodies, joints
-    /// and record are the terms of these layers and rigid is the effort of the rigid body, or that of
-    /// somebody else's twin.
+    /// and record are the terms of these layers and rigid is the effort of the rigid-body model or of an
+    /// external twin.
     fn expected_effort(&mut self, dt_s: f64, sample: &JointState) -> JointArray {
         let n = self.nm_per_unit.len();
         let stamp_ns = sample.header.stamp_ns;
@@ -220,7 +219,7 @@ impl Twin {
     }
 }
 
-/// The terms of a correction, built for the robot or, where it is not known, for its joints alone.
+/// Builds the terms of a correction for the robot or, without a model, for its joints alone.
 fn physics(
     correction: &Correction,
     model: Option<&Model>,
@@ -250,7 +249,7 @@ impl Stage<JointState, TwinState> for Twin {
         let dt_s = self
             .previous_ns
             .map(|before| (stamp_ns - before) as f64 * 1e-9);
-        // A time that runs backwards, a gap, or a source that says so: what the filters hold is void.
+        // A time that runs backwards, a gap, or a reset by the source invalidates the filter states.
         let go_on = matches!(dt_s, Some(dt) if (0.0..=self.max_gap_s).contains(&dt))
             && !sample.header.has(flags::RESET);
 
@@ -283,7 +282,7 @@ impl Stage<JointState, TwinState> for Twin {
         if known {
             self.previous_ns = Some(stamp_ns);
         } else {
-            // The filters hold a void value now: begin anew at the next sample that is whole.
+            // The filter states are invalid now: reset them at the next sample.
             self.previous_ns = None;
         }
         let settled = (stamp_ns - self.reset_ns) as f64 * 1e-9 >= self.settling_time_s;

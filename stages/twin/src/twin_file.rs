@@ -1,5 +1,5 @@
-//! `twin.yaml`: the corrected twin, as `tauscope calibrate` and `tauscope explain` write it and a
-//! pipeline's `twin` stage loads it.
+//! `twin.yaml`: the corrected twin that `tauscope calibrate` and `tauscope explain` write and a
+//! pipeline's `twin` stage loads.
 
 use std::collections::BTreeMap;
 
@@ -21,18 +21,18 @@ pub struct TwinFile {
     pub robot: Robot,
     /// Unit of the measured effort that it predicts: `Nm` or `A`.
     pub effort_unit: String,
-    /// How the residual was filtered when it was made; noise and scores hold for these filters only.
+    /// Filters with which the residual was computed; noise and scores are valid for these filters only.
     pub filters: Filters,
-    /// Correction by joint name. A joint that is not named keeps gain 1 and offset 0.
+    /// Correction by joint name. A joint that is not listed keeps gain 1 and offset 0.
     pub joints: BTreeMap<String, JointCorrection>,
-    /// Physics that the rigid-body model leaves out.
+    /// Physical effects that the rigid-body model lacks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub terms: Vec<TermSpec>,
-    /// By detector, what its score did on contact-free data: its threshold is mean + k standard
-    /// deviations of it.
+    /// Statistics of each detector's score on contact-free data, by detector. Its threshold is the mean plus k
+    /// standard deviations.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub scores: BTreeMap<String, ScoreStatistics>,
-    /// What made this file: program version, recordings and their hashes.
+    /// Origin of this file: program version, recordings and their hashes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub provenance: BTreeMap<String, String>,
 }
@@ -69,18 +69,18 @@ impl Default for Filters {
     }
 }
 
-/// How one joint's measured effort follows from the model's:
+/// Linear relation between one joint's measured effort and the model's:
 /// `measured = gain * model + offset` (Tajiri and Iwamoto, equation 4).
 ///
-/// The model's effort is in N m, or in A where the cell gives torque constants. Where there are terms, the
-/// gain applies to the effort of the bodies; the terms of joints come on top, then those of recording.
+/// The model's effort is in N m, or in A where the cell gives torque constants. If there are terms, the
+/// gain applies to the effort of the bodies; the joint terms are added to it, and the recording terms follow.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointCorrection {
     /// Gain \[effort unit per model unit\].
     pub gain: f64,
-    /// Standard deviation of the gain, where it stands for a torque constant that nobody gave; as large as the gain where the motion
-    /// does not tell.
+    /// Standard deviation of the gain, where the gain replaces a torque constant that is not given. As large as the
+    /// gain where the motion does not identify it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain_deviation: Option<f64>,
     /// Offset \[effort unit\].
@@ -92,21 +92,21 @@ pub struct JointCorrection {
     /// small, the gain is not identifiable from these motions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub explained: Option<f64>,
-    /// Low-pass on this joint's measured and expected effort \[Hz\]; that of the `filters` where none is given.
+    /// Low-pass on this joint's measured and expected effort \[Hz\]. Default: that of the `filters`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.01, max = 10_000.0))]
     pub effort_cutoff_hz: Option<f64>,
 }
 
-/// A line's slope is a drive's gain where the line explains more than this share of the effort's variance,
-/// Statistical: from there on the model explains more of the effort than all else together.
+/// Share of the effort's variance that a line must explain for its slope to be treated as the drive's gain.
+/// Statistical: above it, the model explains more of the effort than everything else together.
 const EXPLAINED: f64 = 0.5;
-/// and a fitted gain is one where it is this many times its standard deviation.
+/// Ratio of a fitted gain to its standard deviation above which it is treated as the drive's gain.
 /// Statistical: five standard deviations exclude 0 with odds of a million to one.
 const KNOWN: f64 = 5.0;
 
 impl JointCorrection {
-    /// Whether the gain tells how much effort 1 N m is, where no torque constant does.
+    /// Returns whether the gain determines the measured effort per N m, in place of a torque constant.
     pub fn tells_torque(&self) -> bool {
         match (self.gain_deviation, self.explained) {
             (Some(deviation), _) => self.gain > KNOWN * deviation,
@@ -137,14 +137,14 @@ pub struct ScoreStatistics {
     pub mean: f64,
     /// Standard deviation.
     pub standard_deviation: f64,
-    /// How many samples.
+    /// Number of samples.
     pub samples: u64,
 }
 
-/// What is wrong with a `twin.yaml` for the robot at hand.
+/// Mismatch between a `twin.yaml` and the robot.
 #[derive(Debug, thiserror::Error)]
 pub enum TwinFileError {
-    /// It corrects a joint that the robot has not.
+    /// A correction of a joint that the robot does not have.
     #[error(
         "the twin corrects joint `{joint}`, which the robot does not have; its joints: {known}"
     )]
@@ -154,7 +154,7 @@ pub enum TwinFileError {
         /// The robot's joints.
         known: String,
     },
-    /// It was made for another unit.
+    /// A file made for another effort unit.
     #[error("the twin predicts effort in {found}, but the cell's effort is in {expected}")]
     Unit {
         /// The file's unit.
@@ -164,12 +164,12 @@ pub enum TwinFileError {
     },
 }
 
-/// A [`TwinFile`] put into a robot's joint order.
+/// The corrections of a [`TwinFile`] in a robot's joint order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
     /// By joint in URDF order.
     pub joints: Vec<JointCorrection>,
-    /// The physics that the rigid-body model leaves out.
+    /// Physical effects that the rigid-body model lacks.
     pub terms: Vec<TermSpec>,
 }
 
@@ -184,17 +184,17 @@ impl Correction {
 }
 
 impl TwinFile {
-    /// Says so if it was made for another robot than `robot`, where both have a name.
+    /// Returns a message if the file was made for another robot than `robot` and both have a name.
     pub fn made_for_other(&self, robot: &str) -> Option<String> {
         let made_for = &self.robot.name;
         let other = !made_for.is_empty() && !robot.is_empty() && made_for != robot;
         other.then(|| format!("this twin was made for the robot `{made_for}`, not for `{robot}`"))
     }
 
-    /// Puts the corrections into the order of `joint_names`.
+    /// Returns the corrections in the order of `joint_names`.
     ///
     /// # Errors
-    /// If the file names a joint that is not there or was made for another effort unit.
+    /// If the file names an unknown joint or was made for another effort unit.
     pub fn resolve(
         &self,
         joint_names: &[String],

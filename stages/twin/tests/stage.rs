@@ -1,6 +1,6 @@
 //! The twin as a stage, on an arm that can be solved on paper: a point mass on a massless rod.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use tauscope_bus::{Emit, Header, JointState, LinkError, Stage, TwinState, flags};
 use tauscope_dynamics::Model;
@@ -101,7 +101,7 @@ fn a_swing_costs_what_it_costs_on_paper() {
     assert_eq!(states.len(), 600);
     assert!(ready(&states).count() > 500);
     for state in ready(&states) {
-        // What is left is the acceleration filter's lag: 19 ms of a swing of 2 s.
+        // The remaining residual comes from the acceleration filter's lag: 19 ms at a period of 2 s.
         assert!(state.residual[0].abs() < 0.3, "{}", state.residual[0]);
     }
 }
@@ -130,7 +130,7 @@ fn plain_zeros_of_a_loaded_arm_are_no_effort_and_what_comes_after_them_settles_a
     let lacking: Vec<usize> = (0..states.len())
         .filter(|i| !has(&states[*i], flags::EFFORT_MEASURED))
         .collect();
-    // Where the arm hangs down it bears nothing, and zero is what it measures.
+    // An arm that hangs straight down is not loaded: zero is a valid measurement there.
     assert!(lacking.len() > 80, "{lacking:?}");
     assert!(lacking.iter().all(|i| zeros.contains(i)), "{lacking:?}");
     assert!(
@@ -178,7 +178,7 @@ fn the_commanded_motion_is_followed_where_there_is_one() {
         0,
         "no command, no effort"
     );
-    // The robot stands still beside its command: the effort is the command's.
+    // The robot stands still in spite of its command: the expected effort is that of the command.
     let commanded = swing(0.8).map(|mut sample| {
         sample.header.flags |= flags::COMMAND | flags::COMMAND_VELOCITY;
         sample.command_position = sample.position;
@@ -402,8 +402,8 @@ fn a_term_that_does_not_fit_the_robot_is_refused() {
     assert!(error.to_string().contains("elbow"), "{error}");
 }
 
-/// Expected efforts of two recordings of 6 s with so many seconds between their first samples are those of a joint that warms
-/// up, whose recording goes on over the gap or begins anew.
+/// Checks the expected efforts of a joint that warms up, over two recordings of 6 s whose first samples are `apart_s`
+/// seconds apart. With `goes_on` the second one continues the first; otherwise a new recording begins after the gap.
 fn warms_up_over(apart_s: i64, goes_on: bool) {
     let terms = r#"[
         {"effect": "friction_step", "joint": "hinge", "parameters":
@@ -420,7 +420,7 @@ fn warms_up_over(apart_s: i64, goes_on: bool) {
         .map(|mut sample| {
             sample.header.stamp_ns += 1_000_000_000_000;
             sample.velocity[0] = 1.0;
-            // Zero would be no measurement of an arm with friction.
+            // An arm with friction is loaded, so exact zeros would be treated as no measurement.
             sample.effort[0] = 1.0;
             sample
         });
@@ -430,7 +430,7 @@ fn warms_up_over(apart_s: i64, goes_on: bool) {
         let session_s = within_s + if i < 600 { 0.0 } else { apart_s as f64 };
         let recording_s = if goes_on { session_s } else { within_s };
         let coulomb = if session_s < 9.995 { 1.0 } else { 3.0 };
-        // Without friction the still arm at 0 costs what its acceleration seems to be.
+        // At position 0 gravity has no torque: the rigid-body effort is that of the apparent acceleration.
         let rigid = 1.5 * MASS_KG * LENGTH_M * LENGTH_M * state.acceleration[0];
         let expected = rigid + coulomb + 10.0 * (-recording_s / 5.0).exp() - 0.25;
         assert!((state.expected_effort[0] - expected).abs() < 1e-9, "{i}");

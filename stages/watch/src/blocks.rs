@@ -38,7 +38,7 @@ impl Ranges {
         self.take(other.high);
     }
 
-    /// Whether `other` exceeds this range in any feature by more than the share `slack` of it.
+    /// Returns whether `other` exceeds this range in any feature by more than the share `slack` of it.
     fn is_left_by(&self, other: &Self, slack: f64) -> bool {
         (0..FEATURES).any(|f| {
             let slack = slack * (self.high[f] - self.low[f]);
@@ -47,14 +47,14 @@ impl Ranges {
     }
 }
 
-/// The lowest and the highest value of each feature, where there is one.
+/// Range of each feature as \[lowest, highest\]; `None` if it has no value.
 pub(crate) type Told = [Option<[f64; 2]>; FEATURES];
 
-/// The ranges in which a joint moved lately. Old motion is forgotten, as in the reference: a program that returns after
+/// The ranges of a joint's recent motion. Old motion is forgotten, as in the reference: a program that returns after
 /// many others is novel again.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Known {
-    /// Ranges of the current generation of blocks, and of the one before.
+    /// Ranges of the current generation of blocks, and of the previous one.
     current: Ranges,
     previous: Ranges,
     blocks: usize,
@@ -80,7 +80,7 @@ impl Known {
         self.blocks += 1;
     }
 
-    /// The ranges of both generations, and how many blocks the current one has. A feature without a range is `None`.
+    /// Returns the ranges of both generations, and the number of blocks in the current one.
     pub fn told(&self) -> ([Told; 2], usize) {
         let told = |ranges: &Ranges| {
             std::array::from_fn(|f| {
@@ -91,7 +91,7 @@ impl Known {
         ([told(&self.current), told(&self.previous)], self.blocks)
     }
 
-    /// What was [`told`](Self::told).
+    /// Restores the ranges returned by [`told`](Self::told).
     pub fn of_told(&([current, previous], blocks): &([Told; 2], usize)) -> Self {
         let ranges = |told: Told| {
             let mut ranges = Ranges::NONE;
@@ -110,7 +110,7 @@ impl Known {
         }
     }
 
-    /// Whether `other` exceeds the ranges of both generations; see [`Ranges::is_left_by`].
+    /// Returns whether `other` exceeds the ranges of both generations; see [`Ranges::is_left_by`].
     pub fn is_left_by(&self, other: &Ranges, slack: f64) -> bool {
         let mut all = self.current;
         all.join(&self.previous);
@@ -139,9 +139,9 @@ pub(super) struct Block {
     pub last_ns: i64,
     pub rows: u32,
     pub joints: Vec<JointBlock>,
-    /// Joints whose residual is far above the usual: bit j for joint j.
+    /// Joints whose residual is far above its baseline: bit j for joint j.
     pub loud: u32,
-    /// Whether it belongs to a contact or is an outlier: nothing is learned or judged from it.
+    /// Whether the block belongs to a contact or is an outlier: it is used neither for learning nor for judging.
     pub excluded: bool,
 }
 
@@ -201,7 +201,7 @@ impl Block {
     }
 }
 
-/// The newest complete blocks, and the open one. Nothing is allocated after it is made.
+/// The newest complete blocks, and the open one. Nothing is allocated after construction.
 #[derive(Debug)]
 pub(super) struct Ring {
     blocks: Vec<Block>,
@@ -211,7 +211,7 @@ pub(super) struct Ring {
 }
 
 impl Ring {
-    /// A ring for `capacity` complete blocks.
+    /// Creates a ring for `capacity` complete blocks.
     pub fn new(capacity: usize, joints: usize) -> Self {
         Self {
             blocks: vec![Block::new(joints); capacity + 1],
@@ -224,7 +224,7 @@ impl Ring {
         self.len
     }
 
-    /// The open block.
+    /// Returns the open block.
     pub fn open(&mut self) -> &mut Block {
         &mut self.blocks[self.at]
     }
@@ -240,7 +240,7 @@ impl Ring {
         (self.at + self.blocks.len() - 1 - back) % self.blocks.len()
     }
 
-    /// A complete block, counted from the newest (0).
+    /// Returns a complete block, counted from the newest (0).
     pub fn back(&self, back: usize) -> &Block {
         &self.blocks[self.place(back)]
     }

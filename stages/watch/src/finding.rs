@@ -1,4 +1,4 @@
-//! What the stage reports.
+//! Findings of the stage: changes and contacts.
 
 use tauscope_bus::Detection;
 use tauscope_dynamics::terms::{
@@ -18,14 +18,14 @@ pub enum Cause {
     CoulombFriction,
     /// Viscous friction of a joint.
     ViscousFriction,
-    /// Another mass carried by the tool.
+    /// A changed mass carried by the tool.
     Payload,
     /// A change that none of the others explains.
     Unknown,
 }
 
 impl Cause {
-    /// The effect of the library; `None` for a contact.
+    /// Returns the effect in the library; `None` for a contact.
     pub fn effect(self) -> Option<&'static Effect> {
         match self {
             Self::Contact => None,
@@ -38,7 +38,7 @@ impl Cause {
         }
     }
 
-    /// Canonical name: that of the effect, or `contact`.
+    /// Returns the canonical name: that of the effect, or `contact`.
     pub fn name(self) -> &'static str {
         self.effect().map_or(CONTACT, |effect| effect.name)
     }
@@ -52,11 +52,11 @@ const CONTACT: &str = "contact";
 pub struct Finding {
     /// The most likely cause.
     pub cause: Cause,
-    /// The joints that show it: bit j for joint j in URDF order.
+    /// The joints at which it is evident: bit j for joint j in URDF order.
     pub joints: u32,
-    /// The joint whose child link was touched; `None` for a change, or where that is not known.
+    /// The joint whose child link was touched; `None` for a change, or if the link is unknown.
     pub link: Option<usize>,
-    /// Begin \[ns since the epoch\].
+    /// Start of the change or contact \[ns since the epoch\].
     pub since_ns: i64,
     /// Size in the unit of [`Detection::size`]; 0 where it has none.
     pub size: f64,
@@ -65,7 +65,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// Writes it into a detection.
+    /// Writes the finding into a detection.
     pub(super) fn tell(&self, slot: &mut Detection) {
         slot.joints = self.joints;
         slot.contact_ns = self.since_ns;

@@ -1,6 +1,6 @@
-//! Decides whether the residual changed, when, and what explains it: for each kind of change the generalised likelihood
-//! ratio over the instant of change (Basseville and Nikiforov, *Detection of Abrupt Changes*, 1993, section 2.4), in
-//! units of the usual gain of that kind.
+//! Decides whether the residual changed, when, and what explains it: for each kind of change the generalised
+//! likelihood ratio over the instant of change (Basseville and Nikiforov, *Detection of Abrupt Changes*, 1993,
+//! section 2.4), in units of the baseline gain of that kind.
 
 mod lasting;
 
@@ -13,45 +13,45 @@ use super::touch;
 use super::usual::{BEYOND, Usual};
 use super::window::Window;
 
-/// A change is reported after this many blocks of motion: 6.5 s.
+/// Blocks of motion after which a change is reported: 6.5 s.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SOONEST: usize = 13;
-/// The same if it is hard to tell from another change: 9 s of motion, so that the report comes within ten seconds.
+/// Blocks of motion after which an ambiguous change is reported: 9 s, so that the report comes within ten seconds.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LATEST: usize = 18;
-/// From this share of joints with novel motion on, contacts and changes of unknown cause are not reported.
+/// Share of joints with novel motion from which contacts and changes of unknown cause are not reported.
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub(super) const STRANGE: f64 = 0.03;
-/// Blocks after which a gain counts as one without a change, if no change was reported.
+/// Blocks without a reported change after which a gain is treated as one without a change.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const DELAY: usize = 22;
-/// No change is reported if the motion of a joint was novel in more than this share of the time since.
+/// Share of the time since a change in which the motion of a joint may be novel; above it, the change is not
+/// reported.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const NEW_MOTION: f64 = 0.5;
-/// A change is hard to tell from another one whose gain is above this share of its own.
+/// Ratio of the second largest gain to the largest above which the change is ambiguous.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const RIVAL: f64 = 0.92;
-/// No change is reported if a force on a link explains more than this many times what the change explains.
+/// Ratio of the gain of a force on a link to that of a change above which the change is not reported.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const FORCED: f64 = 1.15;
-/// The cause is unknown if the best change explains less than this share of what the changes of each joint explain
-/// together.
+/// Ratio of the gain of the best change to the sum of the joints' largest gains below which the cause is unknown.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const EXPLAINED: f64 = 0.5;
-/// Score that a change needs after a long run of loud blocks, where only its cause is in doubt.
+/// Minimum score of a change after a long run of loud blocks, when only its cause is uncertain.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const DOUBTLESS: f64 = 0.2;
-/// Factor on the gain of a constant offset, so that other changes with the same gain are preferred.
+/// Factor on the gain of a constant offset, so that other changes with an equal gain are preferred.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const OFFSET: f64 = 0.96;
-/// A payload's centre of mass is at most so far from the frame of the body that carries it \[m\].
+/// Maximum distance of a payload's centre of mass from the frame of the body that carries it \[m\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const FURTHEST_M: f64 = 0.7;
-/// Subtracted from a payload's gain, because it has three columns more than other changes. They exceed it by chance in
-/// 0.7 % of windows (chi-square, three degrees of freedom); on average they gain 3.
+/// Penalty on a payload's gain for its three additional columns. By chance these gain 3 on average and exceed the
+/// penalty in 0.7 % of windows (chi-square, three degrees of freedom).
 /// Tuned: by hand, on no recorded seeds; not swept.
 const COLUMNS_MORE: f64 = 12.0;
-/// Least usual gain of a payload per column.
+/// Minimum baseline gain of a payload per column.
 /// Statistical: the mean of a squared standard normal number.
 const LEAST_USUAL: f64 = 1.0;
 
@@ -90,7 +90,7 @@ pub(super) enum Verdict {
     Nothing,
     /// The arm changed.
     Changed(Finding),
-    /// The residual differs from the reference, and no begin was seen.
+    /// The residual differs from the reference, and no onset was observed.
     Drifted,
 }
 
@@ -102,7 +102,7 @@ pub(super) struct Judge {
     best: Vec<[Best; JOINT_KINDS]>,
     payload: Best,
     payload_change: [f64; PAYLOAD],
-    /// Largest gain of each kind after each of the newest blocks, and the index of the next entry.
+    /// Largest gain of each kind after each of the newest blocks: a ring, `at` is the index of its next entry.
     past: Vec<Vec<[f64; JOINT_KINDS]>>,
     past_payload: Vec<f64>,
     at: usize,
@@ -124,10 +124,10 @@ impl Judge {
         }
     }
 
-    /// The change within the ring, if there is one, and the likelihood ratio of the most likely change over its
-    /// threshold (1: just enough to be reported).
+    /// Returns the change within the ring, if there is one, and the likelihood ratio of the most likely change over
+    /// its threshold (1: just enough to be reported).
     ///
-    /// If the deviation `lasts`, there is a change: only its cause is sought, and the threshold is lower.
+    /// If the deviation `lasts`, there is a change: only its cause is uncertain, and the threshold is lower.
     pub fn judge(&mut self, ring: &Ring, usual: &Usual<'_>, lasts: bool) -> (Verdict, f64) {
         self.search(ring, usual);
         let Some((first, second, all)) = self.contest(usual) else {
@@ -138,7 +138,7 @@ impl Judge {
         let poor = first.normal < EXPLAINED * all;
         let soonest = if rival || poor { LATEST } else { SOONEST };
         let enough = if lasts { DOUBTLESS } else { 1.0 };
-        // A payload contains a constant force, its weight, so a force must not explain more at all.
+        // A payload contains a constant force, its weight, so a force alone cannot explain more.
         let forced = if first.name == Name::Payload {
             1.0
         } else {
@@ -164,7 +164,7 @@ impl Judge {
         (Verdict::Changed(finding), score)
     }
 
-    /// Remembers the gains of this block. Those of `DELAY` blocks ago count as gains without a change.
+    /// Stores the gains of this block. Those of `DELAY` blocks ago are treated as gains without a change.
     pub fn remember(&mut self, scales: &mut [[Scale; JOINT_KINDS]], payload: &mut Scale) {
         let (past, past_payload) = (&mut self.past[self.at], &mut self.past_payload[self.at]);
         if self.filled == DELAY {
@@ -181,12 +181,12 @@ impl Judge {
         self.filled = (self.filled + 1).min(DELAY);
     }
 
-    /// Forgets the remembered gains.
+    /// Discards the stored gains.
     pub fn forget(&mut self) {
         self.filled = 0;
     }
 
-    /// For each kind, finds the instant of change with the largest gain.
+    /// Finds the instant of change with the largest gain, for each kind.
     fn search(&mut self, ring: &Ring, usual: &Usual<'_>) {
         self.best.fill([Best::default(); JOINT_KINDS]);
         self.payload = Best::default();
@@ -235,7 +235,7 @@ impl Judge {
         }
     }
 
-    /// The change with the largest gain, the second largest gain, and the sum over joints of the largest gain of each.
+    /// Returns the change with the largest gain, the second largest gain, and the sum of the joints' largest gains.
     fn contest(&self, usual: &Usual<'_>) -> Option<(Candidate, f64, f64)> {
         let mut first: Option<Candidate> = None;
         let mut second = 0.0;
@@ -284,13 +284,13 @@ impl Judge {
         first.map(|first| (first, second, all))
     }
 
-    /// Whether the payload's centre of mass is possible.
+    /// Returns whether the payload's centre of mass is plausible.
     fn is_body(&self) -> bool {
         let [mass, x, y, z] = self.payload_change;
         (x * x + y * y + z * z).sqrt() <= FURTHEST_M * mass.abs()
     }
 
-    /// The finding that reports a change.
+    /// Returns the finding that reports a change.
     fn finding(&self, usual: &Usual<'_>, first: &Candidate, ring: &Ring) -> Finding {
         let (cause, joints, size) = match first.name {
             Name::Joint(j, kind) => {
@@ -315,7 +315,7 @@ impl Judge {
         }
     }
 
-    /// Joints at which a change of the whole arm is evident: bit j for joint j.
+    /// Returns the joints at which a change of the whole arm is evident: bit j for joint j.
     fn shown(&self, usual: &Usual<'_>) -> u32 {
         let most = |j: usize| {
             let noise = usual.noise[j].unwrap_or(f64::INFINITY);

@@ -33,7 +33,7 @@ pub const NAME: &str = "residual_watch";
 /// Facts about the cell and its twin.
 #[derive(Debug, Clone)]
 pub struct Setup {
-    /// The robot. Without it neither payloads nor links are reported.
+    /// The robot model. Without it neither payloads nor links are reported.
     pub model: Option<Model>,
     /// Measured effort per torque at the joint, by joint in URDF order \[effort unit per N m\]. NaN where it is not
     /// known: such a joint is not used for payloads and forces.
@@ -48,7 +48,7 @@ pub struct Watch {
     name: Name,
     rows: Rows,
     monitor: Monitor,
-    /// Names of the links: that of the tool, and by joint that of its child link.
+    /// Name of the tool's link, and names of the joints' child links.
     tool: Name,
     links: Vec<Name>,
     /// The change that was reported and is being learned.
@@ -58,7 +58,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// A watch over the residual of a twin.
+    /// Creates a watch over the residual of a twin.
     pub fn new(config: &Config, setup: &Setup) -> Self {
         let model = setup.model.as_ref();
         let name = |model: &Model, link: usize| Name::new(&model.links()[link].name);
@@ -77,24 +77,24 @@ impl Watch {
         }
     }
 
-    /// Goes on from what an earlier life has learnt, if that [fits](Memory::fits) the robot.
+    /// Restores the state learnt by an earlier run, if it [fits](Memory::fits) the robot.
     #[must_use]
     pub fn resumed(mut self, memory: &Memory) -> Self {
         self.monitor.resume(memory);
         self
     }
 
-    /// What it has learnt, to be given to its next life; `None` before it has learnt anything.
+    /// Returns the learnt state for [`Watch::resumed`]; `None` before the first reference is learnt.
     pub fn learnt(&self) -> Option<Memory> {
         self.monitor.watches().then(|| self.monitor.memory())
     }
 
-    /// Whether it learns just now.
+    /// Returns whether the stage is learning a reference.
     pub fn is_learning(&self) -> bool {
         !self.monitor.watches()
     }
 
-    /// Name of the link of a finding; empty if there is none.
+    /// Returns the name of a finding's link; empty if it has none.
     fn link(&self, finding: &Finding) -> Name {
         match finding.cause {
             Cause::Payload => self.tool,

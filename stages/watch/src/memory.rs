@@ -1,4 +1,4 @@
-//! What a watch has learnt, as its file holds it between two runs.
+//! The learnt state of a watch, which its file keeps between runs.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,32 +7,32 @@ use super::blocks::Told;
 use super::moments::{JOINT_KINDS, Moments};
 use super::scale::{Loudness, Scale};
 
-/// What a watch has learnt of an arm.
+/// Learnt state of a watch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Memory {
-    /// By joint in URDF order.
+    /// State by joint, in URDF order.
     pub(crate) joints: Vec<OfJoint>,
-    /// The usual gain of a payload.
+    /// Baseline gain of a payload.
     pub(crate) payload: Scale,
 }
 
-/// What it has learnt of one joint.
+/// Learnt state of one joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct OfJoint {
-    /// The reference: sums of products.
+    /// Reference, as sums of products.
     pub moments: Vec<f64>,
-    /// The ranges in which it moved.
+    /// Ranges of its motion in the current and the previous generation, and number of blocks in the current one.
     pub known: ([Told; 2], usize),
-    /// The usual gain of each kind of change.
+    /// Baseline gain of each kind of change.
     pub scales: [Scale; JOINT_KINDS],
-    /// The energy of its blocks.
+    /// Energy of its blocks.
     pub loudness: Loudness,
 }
 
 impl Memory {
-    /// Whether it is of an arm with so many joints, and whole.
+    /// Returns whether the state is complete and belongs to an arm with `joints` joints.
     pub fn fits(&self, joints: usize) -> bool {
         let whole = |joint: &OfJoint| Moments::of_numbers(&joint.moments).is_some();
         self.joints.len() == joints && self.joints.iter().all(whole)

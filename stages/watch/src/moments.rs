@@ -19,14 +19,14 @@ pub(super) const COULOMB: usize = 2;
 /// Physical: offset, gain, Coulomb and viscous friction.
 pub(super) const JOINT_KINDS: usize = 4;
 
-/// A change is scored only if it keeps this share of its information beside the uncertainty of the reference.
+/// Minimum share of a change's information that remains after the reference is marginalised, for it to be scored.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_INFORMATION: f64 = 0.05;
 
-/// Added to each diagonal element before a Cholesky factorisation, as a share of it.
+/// Relative increase of each diagonal element before a Cholesky factorisation.
 /// Resolution: guards the factorisation of dependent columns.
 const RIDGE: f64 = 1e-7;
-/// The same as a share of the largest diagonal element.
+/// Increase of each diagonal element before a Cholesky factorisation, relative to the largest one.
 /// Resolution: guards the factorisation where a column is zero.
 const RIDGE_OF_LARGEST: f64 = 1e-12;
 
@@ -60,7 +60,7 @@ impl Moments {
         rows: 0.0,
     };
 
-    /// All numbers, in one row.
+    /// Returns all numbers as a flat list.
     pub fn numbers(&self) -> Vec<f64> {
         let products = self.gram.iter().chain(&self.with_residual);
         products
@@ -69,7 +69,7 @@ impl Moments {
             .collect()
     }
 
-    /// Moments of these numbers; `None` if they are not as many as [`Moments::numbers`] gives.
+    /// Restores moments from the list of [`Moments::numbers`]; `None` if its length differs.
     pub fn of_numbers(numbers: &[f64]) -> Option<Self> {
         let (gram, rest) = numbers.split_at_checked(COLUMNS * COLUMNS)?;
         let (with_residual, rest) = rest.split_at_checked(COLUMNS)?;
@@ -105,7 +105,7 @@ impl Moments {
         self.rows *= factor;
     }
 
-    /// Sum of squares of the residual that `coefficients` leave.
+    /// Returns the sum of squares of the residual after the regression with `coefficients` is subtracted.
     fn energy(&self, coefficients: &Coefficients) -> f64 {
         let fitted = self.gram * coefficients;
         let explained = 2.0 * coefficients.dot(&self.with_residual) - coefficients.dot(&fitted);
@@ -113,7 +113,8 @@ impl Moments {
     }
 }
 
-/// Cholesky factor. The diagonal is raised slightly, which only matters in directions without information.
+/// Returns the Cholesky factor. The diagonal is raised slightly, which only matters in directions without
+/// information.
 fn factor<const N: usize>(gram: &SMatrix<f64, N, N>) -> Option<Cholesky<f64, Const<N>>> {
     let largest = (0..N).fold(0.0, |largest: f64, i| largest.max(gram[(i, i)]));
     if largest <= 0.0 {
@@ -126,7 +127,7 @@ fn factor<const N: usize>(gram: &SMatrix<f64, N, N>) -> Option<Cholesky<f64, Con
     Cholesky::new(raised)
 }
 
-/// The usual residual of a joint: its regression and the sums behind it.
+/// The baseline residual of a joint: its regression coefficients and the sums from which they follow.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reference {
     pub moments: Moments,
@@ -149,19 +150,19 @@ impl Reference {
         }
     }
 
-    /// Mean square of the residual that the reference leaves in `window` \[effort unit²\].
+    /// Returns the mean square of the residual in `window` after the reference is subtracted \[effort unit²\].
     pub fn energy_per_row(&self, window: &Moments) -> f64 {
         window.energy(&self.coefficients) / window.rows.max(1.0)
     }
 
-    /// Mean square of the effort that twin and reference together give \[effort unit²\].
+    /// Returns the mean square of the effort predicted by twin and reference together \[effort unit²\].
     pub fn effort_square(&self) -> f64 {
         let c = self.direction(GAIN);
         c.dot(&(self.moments.gram * c)) / self.moments.rows.max(1.0)
     }
 
-    /// A kind of change as a direction in the columns. A gain multiplies the measured effort, so its direction is the
-    /// expected effort plus the reference's residual.
+    /// Returns a kind of change as a direction in the columns. A gain multiplies the measured effort, so its
+    /// direction is the expected effort plus the reference's residual.
     fn direction(&self, kind: usize) -> Coefficients {
         let mut c = Coefficients::zeros();
         if kind == GAIN {
@@ -174,7 +175,7 @@ impl Reference {
     }
 }
 
-/// How much each kind of change explains in a window of one joint.
+/// Gain and size of each kind of change in a window of one joint.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct JointScore {
     /// Sum of squares that the change explains \[effort unit²\].
@@ -183,9 +184,9 @@ pub(super) struct JointScore {
     pub size: [f64; JOINT_KINDS],
 }
 
-/// A window of one joint beside its reference, whose coefficients are marginalised. With A the window's Gram matrix, v
-/// the scores of its innovation and R the reference's Gram matrix, the information on a change along the columns is A -
-/// A (A + R)⁻¹ A, and the score is v - A (A + R)⁻¹ v.
+/// Comparison of a window of one joint with its reference, whose coefficients are marginalised. Let A be the window's
+/// Gram matrix, v the score of its innovation and R the reference's Gram matrix. The information on a change along
+/// the columns is then A - A (A + R)⁻¹ A, and the score is v - A (A + R)⁻¹ v.
 pub(super) struct Compared<'a> {
     window: &'a Moments,
     reference: &'a Reference,
@@ -196,7 +197,7 @@ pub(super) struct Compared<'a> {
 }
 
 impl<'a> Compared<'a> {
-    /// `None` if the window is empty, or if both have no information.
+    /// Compares a window with its reference; `None` if the window is empty, or if neither has any information.
     pub fn new(window: &'a Moments, reference: &'a Reference) -> Option<Self> {
         if window.rows < 1.0 {
             return None;
@@ -214,7 +215,7 @@ impl<'a> Compared<'a> {
         })
     }
 
-    /// Gain of each kind of change: (c·score)² / (c·information c) for a change along c.
+    /// Returns the gain of each kind of change: (c·score)² / (c·information c) for a change along c.
     pub fn joint(&self) -> JointScore {
         let mut result = JointScore::default();
         for kind in 0..JOINT_KINDS {
@@ -230,7 +231,7 @@ impl<'a> Compared<'a> {
         result
     }
 
-    /// Information and score of a change of the whole arm.
+    /// Returns information and score of a change of the whole arm.
     pub fn outer<const D: usize>(&self, outer: &Outer<D>) -> OuterScore<D> {
         let known = outer.cross * self.reference.coefficients;
         OuterScore {
@@ -239,7 +240,8 @@ impl<'a> Compared<'a> {
         }
     }
 
-    /// Estimated share of a change of this kind and size in the window, and the information on that share.
+    /// Returns the estimated share of a change of this kind and size in the window, and the information on that
+    /// share.
     pub fn share(&self, kind: usize, size: f64) -> (f64, f64) {
         let c = self.reference.direction(kind) * size;
         let information = c.dot(&(self.information * c));
@@ -247,8 +249,8 @@ impl<'a> Compared<'a> {
     }
 }
 
-/// Sums of products for a change of the whole arm at one joint: its columns (a payload's mass and first moments, or a
-/// force) with those of the joint's own regression.
+/// Sums of products for a change of the whole arm at one joint: of its columns (a payload's mass and first moments,
+/// or a force) with the columns of the joint's own regression.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Outer<const D: usize> {
     cross: SMatrix<f64, D, COLUMNS>,
@@ -300,13 +302,13 @@ impl<const D: usize> OuterScore<D> {
         self.score += other.score * weight;
     }
 
-    /// The change by least squares, and its gain.
+    /// Returns the least-squares change and its gain.
     pub fn solve(&self) -> Option<([f64; D], f64)> {
         let change = factor(&self.information)?.solve(&self.score);
         Some((change.into(), change.dot(&self.score)))
     }
 
-    /// Estimated share of `change` in the window, and the information on that share.
+    /// Returns the estimated share of `change` in the window, and the information on that share.
     pub fn share(&self, change: &[f64; D]) -> (f64, f64) {
         let change = SVector::<f64, D>::from(*change);
         let information = change.dot(&(self.information * change));

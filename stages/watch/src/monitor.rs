@@ -1,4 +1,4 @@
-//! The monitor: learns the usual residual of the twin, then looks for changes of it.
+//! The monitor: learns the baseline residual of the twin, then detects changes of it.
 
 mod contact;
 mod learning;
@@ -17,22 +17,22 @@ use contact::{Run, Told};
 /// Blocks that are judged before they are learned from: 16 s of motion.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const FRESH: usize = 32;
-/// A deviation below this share of a joint's usual effort is not reported.
+/// Minimum size of a reported deviation, as a share of the joint's root-mean-square effort.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_SHARE: f64 = 0.01;
-/// A motion is novel if it exceeds the known range of a joint by this share of the range.
+/// Share of a joint's known range by which a motion must exceed the range to be novel.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SLACK: f64 = 0.1;
-/// Newest blocks that tell whether the robot runs another program.
+/// Newest blocks from which a new robot program is detected.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const PROGRAM: usize = 20;
-/// The reference is learned again if the motion is novel in more than this share of those blocks, over all joints.
+/// Share of those blocks, over all joints, with novel motion above which the reference is learnt again.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const UNLIKE: f64 = 0.4;
 /// Time constant of the share of joints whose motion is novel \[blocks\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const UNLIKE_BLOCKS: f64 = 60.0;
-/// Windows and blocks that the usual gains and energies weigh as much as after a change.
+/// Maximum weight of the baseline gains and energies after a change \[windows or blocks\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const AFTER_CHANGE: f64 = 64.0;
 
@@ -41,22 +41,22 @@ const AFTER_CHANGE: f64 = 64.0;
 pub(super) enum News {
     /// A contact that ended, or a change of the arm.
     Found(Finding),
-    /// The changed arm was learned: it is the reference from here on.
+    /// The changed arm was learnt and is the new reference.
     Learned,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
-    /// The reference is learned.
+    /// Learning the reference.
     Learning {
         /// Whether a change was reported before.
         told: bool,
     },
-    /// Changes are looked for.
+    /// Detecting changes.
     Watching,
 }
 
-/// The state machine of the stage. Its memory is fixed.
+/// The state machine of the stage. It has a fixed memory size.
 #[derive(Debug)]
 pub(super) struct Monitor {
     learn: usize,
@@ -72,12 +72,12 @@ pub(super) struct Monitor {
     noise: Vec<Option<f64>>,
     judge: Judge,
     run: Option<Run>,
-    /// Blocks since it began to watch.
+    /// Blocks since watching began.
     watched: usize,
-    /// Share of joints whose motion was novel lately.
+    /// Running mean of the share of joints whose motion is novel.
     unlike: f64,
     score: f64,
-    /// Work space.
+    /// Workspace.
     window: Window,
     scores: Vec<Option<JointScore>>,
     aside: Vec<Reference>,
@@ -112,17 +112,17 @@ impl Monitor {
         }
     }
 
-    /// Likelihood ratio of the most likely change over its threshold.
+    /// Returns the likelihood ratio of the most likely change over its threshold.
     pub fn score(&self) -> f64 {
         self.score
     }
 
-    /// Whether it looks for changes; otherwise it learns.
+    /// Returns whether the monitor detects changes; otherwise it learns.
     pub fn watches(&self) -> bool {
         self.phase == Phase::Watching
     }
 
-    /// Takes a row. Rows without motion are ignored.
+    /// Processes a row. Rows without motion are ignored.
     pub fn take(&mut self, row: &Row) -> Option<News> {
         if row.moving == 0 {
             return None;
@@ -144,7 +144,7 @@ impl Monitor {
         if watches { self.watch() } else { self.learn() }
     }
 
-    /// Marks in the newly completed block which joints move in a novel way and which are loud.
+    /// Marks the joints with novel motion and the loud joints in the newly completed block.
     fn listen(&mut self) {
         let block = self.ring.open();
         let (mut novel, mut all) = (0.0, 0.0);
@@ -202,7 +202,7 @@ impl Monitor {
         let drifted = verdict == Verdict::Drifted && self.ring.len() == FRESH;
         let unseen = matches!(run, Some(Told::Unseen));
         if self.is_unlike() || lasts || unseen || drifted {
-            // Another program, drift, or an unknown deviation from the start: the reference must be learned first.
+            // A new program, drift, or an unknown deviation from the start: learn a new reference first.
             self.phase = Phase::Learning { told: false };
             self.ring.keep(PROGRAM);
             self.judge.forget();
@@ -211,7 +211,7 @@ impl Monitor {
         None
     }
 
-    /// Begins to learn a new reference from the newest `blocks`, which follow the change.
+    /// Starts to learn a new reference from the newest `blocks`, which follow the change.
     fn changed(&mut self, finding: Finding, blocks: usize) -> News {
         self.references.fill(Reference::EMPTY);
         self.judge.forget();
@@ -229,7 +229,7 @@ impl Monitor {
         News::Found(finding)
     }
 
-    /// Whether much of the newest motion is novel; see `UNLIKE`.
+    /// Returns whether much of the newest motion is novel; see `UNLIKE`.
     fn is_unlike(&self) -> bool {
         if self.ring.len() < PROGRAM {
             return false;

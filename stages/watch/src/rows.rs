@@ -1,4 +1,4 @@
-//! Rows at 20 Hz from a stream at any rate: columns and residual of each joint, through the same low-pass.
+//! Rows at 20 Hz from a stream at any rate: columns and residual of each joint, filtered by the same low-pass.
 
 use nalgebra::Vector3;
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
@@ -12,16 +12,16 @@ use tauscope_dynamics::{
 use super::Setup;
 use super::moments::JointRow;
 
-/// A row is the mean over this time \[ns\].
+/// Averaging time of a row \[ns\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const ROW_NS: i64 = 50_000_000;
-/// After a longer gap between two rows the low-passes start anew \[s\].
+/// Gap between two rows above which the low-passes are reset \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LONGEST_GAP_S: f64 = 1.0;
-/// A slower joint stands still: its friction may have any value within its limits \[rad/s\].
+/// Speed below which a revolute joint is at standstill: its friction may have any value within its limits \[rad/s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const STANDSTILL_RAD_S: f64 = 0.02;
-/// The same for a sliding joint \[m/s\].
+/// Speed below which a prismatic joint is at standstill \[m/s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const STANDSTILL_M_S: f64 = 0.005;
 
@@ -35,9 +35,9 @@ pub(super) const FORCE: usize = 3;
 /// One instant of the whole arm.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
-    /// Stamp of the last sample in it \[ns since the epoch\].
+    /// Stamp of the row's last sample \[ns since the epoch\].
     pub stamp_ns: i64,
-    /// The joints that move: bit j for joint j.
+    /// The moving joints: bit j for joint j.
     pub moving: u32,
     /// \[rad\]
     pub position: JointArray,
@@ -45,10 +45,9 @@ pub(super) struct Row {
     pub velocity: JointArray,
     /// Columns and residual, by joint.
     pub joints: Vec<JointRow>,
-    /// Columns of a payload, by joint \[effort unit per kg, per kg m\], through the twin's low-pass.
+    /// Columns of a payload, by joint \[effort unit per kg, per kg m\], filtered by the twin's low-pass.
     pub payload: Vec<[f64; PAYLOAD]>,
-    /// Columns of a force at the centre of mass of a link, by joint and by the joint whose child link it is \[effort
-    /// unit per N\].
+    /// Columns of a force at a link's centre of mass, by joint and by the link's parent joint \[effort unit per N\].
     pub force: Vec<Vec<[f64; FORCE]>>,
 }
 
@@ -67,18 +66,18 @@ struct Sums {
     residual: JointArray,
 }
 
-/// Makes rows from samples.
+/// Averages samples to rows.
 #[derive(Debug)]
 pub(super) struct Rows {
     joints: usize,
     standstill: Vec<f64>,
     effort_per_nm: Vec<f64>,
-    /// The robot, and the joint that carries the tool.
+    /// Robot model, its workspace, and the joint that carries the tool.
     robot: Option<(Model, Data, usize)>,
     sums: Sums,
     previous_s: Option<f64>,
     start_ns: i64,
-    /// Low-passes by joint: of direction, velocity and payload columns.
+    /// Low-passes of direction, velocity and payload columns, by joint.
     filters: Vec<[Butterworth2; 2 + PAYLOAD]>,
     settling_s: f64,
     reset_s: f64,
@@ -140,7 +139,7 @@ impl Rows {
         self.previous_s = None;
     }
 
-    /// Takes a sample. Returns the row before it if that is now complete and valid.
+    /// Processes a sample. Returns the preceding row if it is now complete and valid.
     pub fn take(&mut self, sample: &TwinState) -> Option<&Row> {
         let stamp_ns = sample.header.stamp_ns;
         if sample.header.has(flags::RESET) || stamp_ns < self.sums.stamp_ns {
@@ -186,7 +185,8 @@ impl Rows {
         }
     }
 
-    /// Makes the row from the sums. Returns whether it is valid: the twin was ready and the low-passes have settled.
+    /// Computes the row from the sums. Returns whether it is valid: the twin was ready and the low-passes have
+    /// settled.
     fn finish(&mut self) -> bool {
         let n = self.joints;
         let sums = &mut self.sums;
@@ -268,8 +268,8 @@ impl Rows {
         sound
     }
 
-    /// Columns of a force F on each link: the joints exert -Jᵀ F against it. They are not filtered, because the
-    /// Jacobian changes slowly.
+    /// Computes the columns of a force F on each link: the joints exert -Jᵀ F against it. They are not filtered,
+    /// because the Jacobian changes slowly.
     fn forces(&mut self) {
         let Some((model, data, _)) = &mut self.robot else {
             return;

@@ -1,19 +1,19 @@
-//! Usual gains: how much a change explains by chance, learned from the stream itself.
+//! Baseline gains: the gain that a change reaches by chance, learnt from the stream itself.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Most windows that a running mean weighs as much as; one window ends with each block, so 20 minutes of motion.
+/// Maximum weight of a running mean \[windows\]. One window ends with each block, so this is 20 minutes of motion.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MEMORY: f64 = 2400.0;
-/// Short windows before there is a usual gain.
+/// Minimum number of short windows for a baseline gain.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_SHORT: f64 = 4.0;
-/// Long windows before there is a usual gain.
+/// Minimum number of long windows for a baseline gain.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_LONG: f64 = 1.0;
 
-/// A running mean that becomes an exponential one after [`MEMORY`] values.
+/// A running mean that becomes an exponentially weighted one after [`MEMORY`] values.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Mean {
@@ -33,14 +33,14 @@ impl Mean {
     }
 }
 
-/// The gain of a change in windows without one. It is larger than white noise gives, and grows with the length of the
+/// The gain of a change in windows without one. It exceeds that of white noise, and grows with the length of the
 /// window, if the residual is correlated or if the twin has errors that the reference does not contain.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Scale {
     short: Mean,
     long: Mean,
-    /// The largest gain without a change, over all instants of change.
+    /// Largest gain without a change, over all instants of change.
     largest: f64,
 }
 
@@ -52,7 +52,7 @@ impl Scale {
     /// Tuned: by hand, on no recorded seeds; not swept.
     pub const LONG: usize = 16;
 
-    /// Takes the gain of the change in a window of this length.
+    /// Adds the gain of the change in a window of this length.
     pub fn take(&mut self, blocks: usize, gain: f64) {
         if blocks == Self::SHORT {
             self.short.take(gain);
@@ -61,13 +61,13 @@ impl Scale {
         }
     }
 
-    /// Takes the largest gain of the change over all instants, without a change. Twin errors in some phases of a motion
-    /// and slow drift return, and then may be a little larger.
+    /// Adds the largest gain over all instants in motion without a change. Twin errors in some phases of a motion and
+    /// slow drift recur, and may then be slightly larger.
     pub fn take_largest(&mut self, gain: f64) {
         self.largest = (self.largest * (1.0 - PEAK_DECAY)).max(gain);
     }
 
-    /// The largest gain without a change; see [`Scale::take_largest`].
+    /// Returns the largest gain without a change; see [`Scale::take_largest`].
     pub fn largest(&self) -> f64 {
         self.largest
     }
@@ -78,19 +78,20 @@ impl Scale {
         self.long.weigh(windows);
     }
 
-    /// The usual gain: the larger of the means over short and long windows. `None` before enough windows were seen.
+    /// Returns the baseline gain: the larger of the means over short and long windows. `None` before there are enough
+    /// windows.
     pub fn usual(&self) -> Option<f64> {
         (self.short.count >= LEAST_SHORT && self.long.count >= LEAST_LONG)
             .then(|| self.short.value.max(self.long.value))
     }
 
-    /// Number of long windows without overlap that the usual gain is the mean of.
+    /// Returns the number of long windows without overlap behind the baseline gain.
     pub fn independent(&self) -> f64 {
         (self.long.count + Self::LONG as f64 - 1.0) / Self::LONG as f64
     }
 }
 
-/// Energy per row of a joint's residual in a block, beside the reference: its mean and its largest value.
+/// Energy per row of a joint's residual in a block after the reference is subtracted: mean and largest value.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Loudness {
@@ -98,16 +99,16 @@ pub(crate) struct Loudness {
     peak: f64,
 }
 
-/// A block is loud if its energy is above this many times the mean.
+/// Ratio of a block's energy to the mean above which the block is loud.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const OVER_MEAN: f64 = 40.0;
-/// It must also be above this many times the largest energy so far.
+/// Ratio of a loud block's energy to the largest energy so far that it must also exceed.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const OVER_PEAK: f64 = 4.0;
-/// Share of the largest value that is forgotten with each block: half of it in an hour of 7200 blocks.
+/// Decay of the largest value per block: to half in an hour of 7200 blocks.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const PEAK_DECAY: f64 = 1e-4;
-/// Blocks before any block can be loud.
+/// Minimum number of blocks behind the mean before a block can be loud.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_BLOCKS: f64 = 8.0;
 
@@ -127,7 +128,7 @@ impl Loudness {
         self.mean.weigh(blocks);
     }
 
-    /// Whether a block with this energy is loud; the mean counts as at least `floor`.
+    /// Returns whether a block with this energy is loud; the mean is raised to at least `floor`.
     pub fn is_beyond(&self, energy_per_row: f64, floor: f64) -> bool {
         self.mean.count >= LEAST_BLOCKS
             && energy_per_row > OVER_MEAN * self.mean.value.max(floor)

@@ -1,6 +1,6 @@
 //! Streams with and without changes and contacts, and what the stage reports of them.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 #![allow(
     clippy::needless_range_loop,
     reason = "several arrays have the same index"
@@ -13,7 +13,7 @@ use tauscope_bus::{Detection, Emit, LinkError, Stage};
 use super::{Config, Setup, Watch};
 use stream::{Act, Stream};
 
-/// What the stage reported: when \[s\], what, where.
+/// A report of the stage: time \[s\], change, place and size.
 #[derive(Debug, Clone)]
 struct Said {
     t_s: f64,
@@ -58,8 +58,7 @@ impl Emit<Detection> for Listen<'_> {
     }
 }
 
-/// What is reported of a stream. With each report, how long the arm was in motion between `since_s` and the report
-/// \[s\].
+/// Returns the reports on a stream, each with the duration of motion between `since_s` and the report \[s\].
 fn watch_since(stream: &mut Stream, duration_s: f64, since_s: f64) -> Vec<(Said, f64)> {
     let setup = Setup {
         model: Some(stream.nominal.clone()),
@@ -91,10 +90,10 @@ fn texts(said: &[Said]) -> String {
     said.iter().map(Said::text).collect::<Vec<_>>().join(" | ")
 }
 
-/// End of a change that lasts.
+/// End of a lasting change.
 const FOR_GOOD: f64 = f64::INFINITY;
 
-/// A change, and the name, joints and size that are to be reported.
+/// Changes with the expected name, joints and size of their reports.
 const CHANGES: [(Act, &str, u32, f64); 7] = [
     (Act::Viscous(3, 4.0), "viscous_friction", 0b1000, 4.0),
     (Act::Coulomb(2, 1.0), "coulomb_friction", 0b100, 1.0),
@@ -182,12 +181,12 @@ fn a_contact_is_not_taken_for_a_change() {
     }
 }
 
-/// Whether the twin is calibrated, and after how long the motion changes \[s\]: never.
+/// A calibrated twin (`true`) with the period between motion changes \[s\]: never.
 const ONE_PROGRAM: [(bool, f64); 1] = [(true, f64::INFINITY)];
-/// The same for a rigid twin and new motions.
+/// Uncalibrated rigid-body twins with motions that change.
 const NEW_PROGRAMS: [(bool, f64); 2] = [(false, 12.0), (false, 300.0)];
 
-/// Reports over hours of an arm that warms up, as lines of text.
+/// Returns the reports over hours of motion of an arm that warms up, as lines of text.
 fn clean(seed: u64, hours: f64, programs: &[(bool, f64)]) -> String {
     let mut all = String::new();
     for &(calibrated, program_s) in programs {
@@ -343,7 +342,7 @@ fn figures() {
     println!("500 Hz: {mean:?} a sample on average, 99.9 % within {slow:?}");
 }
 
-/// Prints the reports of the same arms with new motions now and then. There are some.
+/// Prints the reports of the eight arms when the motion changes occasionally. A few reports are expected.
 #[test]
 #[ignore = "prints"]
 fn new_programs() {

@@ -1,12 +1,12 @@
-//! How much of the residual a constant force on one of the links explains.
+//! The part of the residual that a constant force on one of the links explains.
 
 use super::blocks::Ring;
 use super::moments::{Compared, Moments, Outer, OuterScore};
 use super::rows::FORCE;
 use super::usual::Usual;
 
-/// The joint on whose child link a constant force explains the most between two blocks (counted from the newest), and
-/// the gain in units of noise; 0 if no force explains anything.
+/// Returns the joint on whose child link a constant force explains the most between two blocks (counted from the
+/// newest), and the gain in units of noise; 0 if no force explains anything.
 pub(super) fn strongest(
     ring: &Ring,
     usual: &Usual<'_>,

@@ -1,4 +1,4 @@
-//! Sums over consecutive blocks, and how much each change explains in them.
+//! Sums over consecutive blocks, and the gain of each change in them.
 
 use super::blocks::Block;
 use super::moments::{Compared, JointScore, Moments, Outer, OuterScore, Reference};
@@ -9,7 +9,7 @@ use super::rows::PAYLOAD;
 pub(super) struct Window {
     pub own: Vec<Moments>,
     payload: Vec<Outer<PAYLOAD>>,
-    /// Blocks in it, and by joint the number of them in which its motion is novel.
+    /// Number of blocks in the window, and of those in which a joint's motion is novel, by joint.
     pub blocks: usize,
     pub novel: Vec<usize>,
 }
@@ -41,7 +41,7 @@ impl Window {
     }
 
     /// Writes the score of each change at each joint into `joints`. Returns the score of a payload, in units of the
-    /// joints' `noise` \[effort unit²\]; a joint without noise does not count for it.
+    /// joints' `noise` \[effort unit²\]; a joint of unknown noise does not contribute to it.
     pub fn scores(
         &self,
         references: &[Reference],

@@ -1,19 +1,19 @@
-//! Everything that reads what others wrote, as targets for a fuzzer: whatever the bytes, no panic, no abort, no hang
-//! and no more memory than is bounded. `README.md` says what was run, and what it found.
+//! Fuzz targets for all code that reads foreign bytes: any input must give no panic, no abort, no hang and bounded
+//! memory. `README.md` lists the runs and their findings.
 
 mod bus;
 mod files;
 mod messages;
 
-/// Takes an input. It may refuse it in any way that an error is.
+/// Processes an input. It may return any error.
 pub type Take = fn(&[u8]);
 
-/// One place at which tauscope reads what others wrote.
+/// One place at which tauscope reads foreign bytes.
 #[derive(Debug, Clone, Copy)]
 pub struct Target {
-    /// Also the folder of its corpus.
+    /// Name, also of the folder of its corpus.
     pub name: &'static str,
-    /// What reads.
+    /// Function under test.
     pub take: Take,
 }
 
@@ -23,7 +23,7 @@ macro_rules! targets {
     };
 }
 
-/// All of them.
+/// All targets.
 pub const TARGETS: [Target; 12] = targets! {
     bus_samples: bus::samples,
     cdr: messages::cdr,

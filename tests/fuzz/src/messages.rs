@@ -1,4 +1,4 @@
-//! Messages of others: ROS 2, a fleet's cells, people's commands, a PLC.
+//! Foreign messages: ROS 2, a fleet's cells, commands of people, a PLC.
 
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpStream};
@@ -12,7 +12,7 @@ use tauscope_fleet::inbox;
 use tauscope_fleet::wall::{Now, Wall};
 use tauscope_publish::{Config, Facts, Publisher, Setup, StreamInfo};
 
-/// A message of ROS 2, as each type that is read.
+/// A message of ROS 2, decoded as each supported type.
 pub fn cdr(bytes: &[u8]) {
     let _ = ros::decode::<ros::JointState>(bytes);
     let _ = ros::decode::<ros::DynamicJointState>(bytes);
@@ -25,7 +25,7 @@ pub fn cdr(bytes: &[u8]) {
     let _ = decoder.guess_into(bytes, &mut ros::JointState::default());
 }
 
-/// What a cell tells its fleet: a key, a line break, a payload. The wall shows what passes.
+/// A message of a cell to its fleet: a key, a line break, a payload. Valid ones go to the wall.
 pub fn status(bytes: &[u8]) {
     let at = bytes.iter().position(|&byte| byte == b'\n');
     let (key, payload) = bytes.split_at(at.unwrap_or(bytes.len().min(32)));
@@ -45,7 +45,7 @@ pub fn status(bytes: &[u8]) {
     let _ = serde_json::to_string(&wall.snapshot());
 }
 
-/// A command: asked for in JSON, checked, and read again from an archive.
+/// A command: parsed from JSON, checked, and read again from an archive.
 pub fn command(bytes: &[u8]) {
     let _ = Request::from_json(bytes).and_then(|request| request.command());
     let signed = Signed::from_json(bytes);
@@ -61,10 +61,10 @@ pub fn command(bytes: &[u8]) {
     assert_eq!(Request::archived(verb, find), Ok(command), "archived");
 }
 
-/// What a PLC, or anybody, sends to the Modbus server. It goes on answering afterwards.
+/// Bytes of a client of the Modbus server, which must keep answering afterwards.
 pub fn modbus(bytes: &[u8]) {
     let mut plc = connect();
-    // The server may hang up in the middle of it.
+    // The server may disconnect at any time.
     let _ = plc
         .write_all(bytes)
         .and_then(|()| plc.shutdown(Shutdown::Write));
@@ -88,7 +88,7 @@ fn connect() -> TcpStream {
     stream
 }
 
-/// The address of a publisher's Modbus server that runs as long as the process.
+/// Address of a publisher's Modbus server that runs as long as the process.
 fn server() -> SocketAddr {
     static PUBLISHER: OnceLock<SocketAddr> = OnceLock::new();
     *PUBLISHER.get_or_init(|| {

@@ -11,11 +11,11 @@ use proptest::strategy::ValueTree as _;
 use proptest::test_runner::{Config, TestRng, TestRunner};
 use tauscope_fuzz::{TARGETS, Take};
 
-/// For how long each target is fuzzed.
+/// Duration of fuzzing per target.
 /// Resolution: time of the tests.
 const FOR: Duration = Duration::from_secs(3);
 
-/// What is done to an input, at a place from 0 (its beginning) to 1.
+/// Change of an input, at a place from 0 (its beginning) to 1.
 #[derive(Debug, Clone)]
 enum Change {
     Byte(f64, u8),

@@ -1,4 +1,4 @@
-//! How long a sender waits for a receiver whose buffer is full.
+//! Back-pressure: the wait of a sender for a receiver whose buffer is full.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -7,28 +7,28 @@ use std::time::Duration;
 
 use iceoryx2::port::{BackpressureAction, BackpressureInfo};
 
-/// Number of first tries, which iceoryx2 spends yielding.
+/// Number of retries before the first sleep; iceoryx2 yields between them.
 /// Resolution: the delay of a sample, against computing time.
 const YIELDS: u64 = 20;
-/// Wait after each further try.
+/// Sleep between retries up to [`LONG_FROM`].
 /// Resolution: the delay of a sample, against computing time.
 const SHORT: Duration = Duration::from_micros(50);
-/// Wait after each try from [`LONG_FROM`] on.
+/// Sleep between retries from [`LONG_FROM`] on.
 /// Resolution: the delay of a sample, against computing time.
 const LONG: Duration = Duration::from_millis(1);
-/// The long wait begins this long after the first try.
+/// Time after the first try from which on the sleep is [`LONG`].
 /// Resolution: the delay of a sample, against computing time.
 const LONG_FROM: Duration = Duration::from_millis(100);
 
-/// Shared by a sender and the handler that iceoryx2 calls while it waits within a send.
+/// State shared by a sender and the handler that iceoryx2 calls while a send is blocked.
 #[derive(Debug)]
 pub(super) struct Backpressure {
     patience: Duration,
-    /// Number of the present send.
+    /// Number of the current send.
     send: AtomicU64,
-    /// Refusals of the present send.
+    /// Receivers that did not take the sample of the current send.
     refused: AtomicU64,
-    /// The last send that a receiver's patience ran out in, by its port.
+    /// Number of the last send in which a receiver's stall timeout expired, by its port id.
     gave_out: Mutex<HashMap<u128, u64>>,
 }
 
@@ -42,26 +42,26 @@ impl Backpressure {
         }
     }
 
-    /// A send begins.
+    /// Begins the next send.
     pub(super) fn begin(&self) {
         self.send.fetch_add(1, Ordering::Relaxed);
         self.refused.store(0, Ordering::Relaxed);
     }
 
-    /// How many receivers have refused the sample of the present send.
+    /// Number of receivers that did not take the sample of the current send.
     pub(super) fn refused(&self) -> usize {
         self.refused.load(Ordering::Relaxed) as usize
     }
 
-    /// A receiver's buffer is full. One that refused the sample before this one as well has taken
-    /// nothing in between, and is not waited for again.
+    /// Decides between retry and discard for a receiver whose buffer is full. A receiver that did not take the
+    /// previous sample either has read nothing in between, and the sender does not wait for it again.
     pub(super) fn decide(&self, info: &BackpressureInfo) -> BackpressureAction {
         let send = self.send.load(Ordering::Relaxed);
         let mut gave_out = self.gave_out.lock().unwrap_or_else(PoisonError::into_inner);
         let last = gave_out.get(&info.receiver_port_id).copied();
         let stuck = last.is_some_and(|last| last + 1 == send);
         if stuck || info.elapsed_time >= self.patience {
-            // Receivers that have gone leave an entry; few ever do, and old ones say nothing.
+            // Drops the entries of disconnected receivers: only those of the previous send are ever read.
             gave_out.retain(|_, last| *last + 1 >= send);
             gave_out.insert(info.receiver_port_id, send);
             self.refused.fetch_add(1, Ordering::Relaxed);

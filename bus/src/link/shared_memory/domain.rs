@@ -1,4 +1,4 @@
-//! Which processes hear each other.
+//! Domains: the names that isolate the runs on a host from each other.
 
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -11,32 +11,32 @@ use serde::{Deserialize, Serialize};
 use super::open_error;
 use crate::link::LinkError;
 
-/// Where Linux keeps shared memory that has a name.
+/// Directory of named shared memory on Linux.
 pub(super) const SEGMENTS: &str = "/dev/shm";
 
-/// The name under which the processes of one run find each other on a host, and that keeps two runs
-/// apart: 1 to 16 of `a-z`, `0-9` and `_`.
+/// The name by which the processes of one run find each other on a host, and which isolates them from other runs:
+/// 1 to 16 of `a-z`, `0-9` and `_`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Domain(String);
 
-/// A text that is no [`Domain`].
+/// A text that is not a valid [`Domain`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is no domain: 1 to {max} of a-z, 0-9 and _", max = Domain::CAPACITY)]
 pub struct DomainError(String);
 
 impl Domain {
-    /// Longest name in bytes: sockets below it must have paths of less than 104.
+    /// Longest name \[bytes\]: the paths of sockets below it must be shorter than 104 bytes.
     /// Physical: `sockaddr_un` of Linux holds a path of 108 bytes, that of macOS 104.
     pub const CAPACITY: usize = 16;
 
-    /// How the name of a domain's folder in `/tmp` begins.
+    /// Prefix of a domain's folder in `/tmp`.
     pub(super) const FOLDER: &str = "tauscope_";
 
     /// The domain of that name.
     ///
     /// # Errors
-    /// If it is too long or has other characters.
+    /// If the name is empty, too long or has other characters.
     pub fn new(name: &str) -> Result<Self, DomainError> {
         let fits = (1..=Self::CAPACITY).contains(&name.len());
         let plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_';
@@ -47,15 +47,15 @@ impl Domain {
         }
     }
 
-    /// A domain that no other process has made: of the process id and the time.
+    /// A domain that no other process has created, named after the process id and the time.
     pub fn unique() -> Self {
         let now = SystemTime::now().duration_since(UNIX_EPOCH);
         let nanoseconds = now.map_or(0, |elapsed| elapsed.as_nanos()) as u32;
-        // Two in one process differ by the time alone, which has this resolution at least.
+        // Two domains of one process differ in the time only, hence the nanoseconds.
         Self(format!("t{:07x}{nanoseconds:08x}", std::process::id()))
     }
 
-    /// Whether [`Domain::unique`] gives such names.
+    /// Whether the name has the form of those from [`Domain::unique`].
     pub(super) fn is_unique_name(name: &str) -> bool {
         let digits = name.strip_prefix('t').unwrap_or_default();
         digits.len() == 15 && digits.bytes().all(|b| b.is_ascii_hexdigit())
@@ -66,16 +66,16 @@ impl Domain {
         &self.0
     }
 
-    /// Where the files of the domain lie, besides those in shared memory.
+    /// Directory of the domain's files, except for its shared memory segments.
     pub fn directory(&self) -> PathBuf {
         PathBuf::from(format!("/tmp/{}{}", Self::FOLDER, self.0))
     }
 
-    /// Removes all that a domain has left on this host. Nobody may use it any more: iceoryx2 takes
-    /// no segment away whose files are gone.
+    /// Removes all files and segments of the domain on this host, itself, because iceoryx2 removes no segment whose
+    /// files are missing. No process may still use the domain.
     ///
     /// # Errors
-    /// If something cannot be removed.
+    /// If a file or segment cannot be removed.
     pub fn remove(&self) -> io::Result<()> {
         let gone = |result: io::Result<()>| match result {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),

@@ -1,4 +1,4 @@
-//! What killed runs have left on this host: folders in `/tmp` and segments in `/dev/shm`.
+//! Leftovers of killed runs on this host: folders in `/tmp` and segments in `/dev/shm`.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, SystemTime};
@@ -10,12 +10,13 @@ use iceoryx2::service::ipc_threadsafe::Service;
 
 use super::domain::{Domain, SEGMENTS};
 
-/// A run makes its folder before its node: what is younger than this may just be beginning.
-/// Resolution: how long leftovers stay at least.
+/// Age below which a folder may belong to a run that is just starting, because a run creates its folder before its
+/// node.
+/// Resolution: shortest lifetime of leftovers.
 const BEGINNING: Duration = Duration::from_mins(1);
 
-/// The domains of runs that have ended without removing what they had. iceoryx2 tells whether a process of a domain
-/// lives by a lock on a file, so that it holds across containers that share `/tmp` and `/dev/shm`, too.
+/// Returns the domains of runs that ended without removing their files. iceoryx2 detects live processes of a domain
+/// by a file lock, so this also works across containers that share `/tmp` and `/dev/shm`.
 ///
 /// # Errors
 /// If a folder cannot be read.
@@ -39,10 +40,10 @@ pub fn left_behind() -> io::Result<Vec<Domain>> {
     Ok(domains.filter(is_abandoned).collect())
 }
 
-/// Removes them; gives how many there were.
+/// Removes the domains that [`left_behind`] finds and returns their number.
 ///
 /// # Errors
-/// If one cannot be removed, or a folder cannot be read.
+/// If a domain cannot be removed, or a folder cannot be read.
 pub fn remove_left_behind() -> io::Result<usize> {
     let domains = left_behind()?;
     for domain in &domains {

@@ -15,15 +15,15 @@ use crate::link::sequence::Tracker;
 use crate::link::{Keep, LinkError, MAX_DEPTH, Position, Received, Receiver, ReceiverCounts, Wake};
 use crate::sample::Sample;
 
-/// While a receiver spins: how often it looks for senders that are new.
-/// Resolution: how soon a sender is greeted, against the cost of looking.
+/// Interval at which a spinning receiver polls for new senders.
+/// Resolution: connection delay, against the cost of polling.
 const GREET_EVERY: Duration = Duration::from_millis(1);
 
-/// How a receiver waits, as its [`Wake`] says.
+/// Wait of a receiver, according to its [`Wake`].
 enum Waiting {
-    /// Until an event comes, or so long.
+    /// Wait for an event, at most for this time.
     Woken(Box<Listener<Service>>, Duration),
-    /// So long between two looks.
+    /// Polling interval; zero for busy polling.
     Looks(Duration),
 }
 
@@ -33,7 +33,7 @@ pub(super) struct SharedMemoryReceiver<T: Sample> {
     samples: Samples<T>,
     waiting: Waiting,
     back: Notifier<Service>,
-    /// The senders that have been told that they are heard.
+    /// Senders whose connection this receiver has acknowledged.
     greeted: Vec<u128>,
     tracker: Tracker,
 }
@@ -84,7 +84,7 @@ impl<T: Sample> SharedMemoryReceiver<T> {
         Ok(receiver)
     }
 
-    /// What is there now; the sample is read where it lies in the sender's segment.
+    /// Takes the next available sample and reads it in place, in the sender's segment.
     fn take(&mut self, read: &mut dyn FnMut(&T)) -> Result<Received, LinkError> {
         while let Some(sample) = self.subscriber.receive().map_err(|e| self.error(&e))? {
             let header = sample.payload().header();
@@ -108,7 +108,7 @@ impl<T: Sample> SharedMemoryReceiver<T> {
         Ok(Received::Nothing)
     }
 
-    /// Maps the memory of senders that are new, and tells them so.
+    /// Maps the memory of new senders and acknowledges the connection to them.
     fn greet(&mut self) -> Result<(), LinkError> {
         let mut there = [None; MAX_SENDERS];
         let mut slots = there.iter_mut();
@@ -123,7 +123,7 @@ impl<T: Sample> SharedMemoryReceiver<T> {
         self.greeted.retain(|id| there().any(|other| other == id));
         for &id in there() {
             if !self.greeted.contains(&id) {
-                // Looks for new senders first.
+                // Maps the memory of new senders before it answers.
                 self.has_samples()?;
                 self.tell(greeting(id))?;
                 self.greeted.push(id);
@@ -169,7 +169,7 @@ impl<T: Sample> Receiver<T> for SharedMemoryReceiver<T> {
                 return Ok(Received::Nothing);
             }
             match &self.waiting {
-                // A notification that came since the look above ends this wait at once.
+                // A notification that arrived since the poll above ends this wait at once.
                 Waiting::Woken(by, pause) => {
                     wait(by, left.min(*pause), |_| {}).map_err(|e| self.error(&e))?;
                 }

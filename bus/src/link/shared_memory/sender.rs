@@ -15,11 +15,11 @@ use super::{END_TAKEN, Joined, Samples, SharedMemory, URGENT, greeting, open_err
 use crate::link::{Keep, LinkError, Sender, SenderCounts};
 use crate::sample::{Sample, flags};
 
-/// While a receiver takes nothing: how often the sender looks whether it is dead.
-/// Resolution: how soon a dead receiver is noticed, against the cost of looking.
+/// Interval of the check for crashed receivers while a receiver takes nothing.
+/// Resolution: detection delay of a crashed receiver, against the cost of the check.
 const CLEAN_EVERY: Duration = Duration::from_secs(1);
-/// A receiver that leaves says nothing: while the sender waits for it, it looks this often.
-/// Resolution: how soon a receiver that left is noticed, against the cost of looking.
+/// Polling interval for disconnected receivers during a wait, because a receiver disconnects without an event.
+/// Resolution: detection delay of a disconnected receiver, against the cost of polling.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 pub(super) struct SharedMemorySender<T: Sample> {
@@ -30,17 +30,18 @@ pub(super) struct SharedMemorySender<T: Sample> {
     publisher: Publisher<Service, T, Joined>,
     samples: Samples<T>,
     wake: Notifier<Service>,
-    /// For those who are woken for an alarm alone.
+    /// Notifies receivers that wake up for urgent samples only.
     urgent: Option<Notifier<Service>>,
     back: Listener<Service>,
     greeting: EventId,
-    /// Receivers that hear this sender, and those that have taken the end.
+    /// Number of receivers that have acknowledged the connection.
     greeted: usize,
+    /// Number of receivers that have taken the end.
     taken: usize,
-    /// How many receivers the end was sent to.
+    /// Number of receivers that the end was sent to.
     ended: usize,
     backpressure: Arc<Backpressure>,
-    /// A sum over the receivers' ids, and the sequence number it stands since.
+    /// Sum of the receivers' ids; `joined` has the sequence number of its last change.
     receivers: u128,
     joined: Joined,
     cleaned: Instant,
@@ -55,7 +56,7 @@ impl<T: Sample> SharedMemorySender<T> {
         keep: Keep,
         expected: usize,
     ) -> Result<Self, LinkError> {
-        // Before the publisher, so that no greeting is missed.
+        // Opened before the publisher, so that no acknowledgement is missed.
         let back = transport
             .events(stream, keep, "/back")?
             .listener_builder()
@@ -104,7 +105,7 @@ impl<T: Sample> SharedMemorySender<T> {
         })
     }
 
-    /// Sends one sample and returns how many receivers have got it.
+    /// Sends one sample and returns the number of receivers that got it.
     fn send(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<usize, LinkError> {
         self.notice_receivers();
         let mut slot = self.publisher.loan().map_err(|e| self.error(&e))?;
@@ -132,8 +133,8 @@ impl<T: Sample> SharedMemorySender<T> {
         Ok(delivered)
     }
 
-    /// Where the newest receiver came in. One that keeps all misses nothing before it is full, so
-    /// that the first sample it hears is where it came in.
+    /// Records where the newest receiver connected. A keep-all receiver misses no sample before its buffer is full,
+    /// so the first sample that it gets is the one at which it connected.
     fn notice_receivers(&mut self) {
         if self.keep == Keep::All {
             self.joined.since = self.next;
@@ -150,7 +151,7 @@ impl<T: Sample> SharedMemorySender<T> {
         }
     }
 
-    /// Waits on the back channel and counts what came.
+    /// Waits on the back channel and counts the events.
     fn listen(&mut self, timeout: Duration) -> Result<(), LinkError> {
         let (mut greeted, mut taken) = (0, 0);
         wait(&self.back, timeout, |event| {

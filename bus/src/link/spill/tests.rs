@@ -5,7 +5,7 @@ use crate::sample::JointState;
 const LONG: Duration = Duration::from_secs(20);
 const DEPTH: usize = 16;
 
-/// A queue for `samples` before a receiver that takes nothing yet.
+/// A queue for `samples` in front of a receiver that takes nothing yet.
 fn spilled(samples: usize, waits: bool) -> (Spill<JointState>, Box<dyn Receiver<JointState>>) {
     let links = InProcess::new().with_patience(LONG);
     let receiver = links.receiver("c/s", Keep::All, DEPTH).unwrap();

@@ -1,4 +1,4 @@
-//! Endpoints: what is one, and why one cannot be reached.
+//! Endpoints: syntax check, and diagnosis of unreachable ones.
 
 use std::io;
 use std::net::{TcpStream, ToSocketAddrs as _};
@@ -8,41 +8,41 @@ use zenoh::Wait as _;
 
 use super::{config, zenoh_reason};
 
-/// The transports that are built in.
+/// Built-in transports.
 const TRANSPORTS: [&str; 2] = ["tcp", "tls"];
-/// A session that has met nobody after this time has a reason.
-/// Resolution: how soon a wrong endpoint is named, against peers that are still starting.
+/// Time after which a session without a peer is diagnosed.
+/// Resolution: delay of the report of a wrong endpoint, against peers that are still starting.
 const MEETS_WITHIN: Duration = Duration::from_secs(4);
-/// And after this one it is said again.
+/// Interval at which the report is repeated.
 const AGAIN_AFTER: Duration = Duration::from_mins(5);
-/// How often it is looked.
+/// Polling interval for the first peer.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
-/// How long an endpoint may take to answer.
+/// Timeout of a connection attempt during the diagnosis.
 const ANSWER_WITHIN: Duration = Duration::from_secs(2);
 
-/// Why a text is no endpoint.
+/// Reason why a text is not an endpoint.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum EndpointError {
-    /// It does not begin with a transport.
+    /// Missing transport.
     #[error("`{0}` is no endpoint: it has the form `tcp/HOST:PORT`")]
     Form(String),
-    /// The transport is not built in.
+    /// Transport that is not built in.
     #[error("`{endpoint}`: there is no transport `{transport}`, only {}", TRANSPORTS.join(" and "))]
     Transport {
         /// The endpoint.
         endpoint: String,
-        /// What it begins with.
+        /// Transport of the endpoint.
         transport: String,
     },
-    /// It names no host or no port.
+    /// Missing or malformed host or port.
     #[error("`{0}` names no host and port: it has the form `tcp/HOST:PORT`")]
     Address(String),
 }
 
-/// Whether Zenoh could use it: `tcp/HOST:PORT` or `tls/HOST:PORT#SETTINGS`. Nobody need be there.
+/// Checks the syntax of an endpoint: `tcp/HOST:PORT` or `tls/HOST:PORT#SETTINGS`. It need not be reachable.
 ///
 /// # Errors
-/// Why not.
+/// If Zenoh cannot use the endpoint.
 pub fn check_endpoint(endpoint: &str) -> Result<(), EndpointError> {
     let Some((transport, _)) = endpoint.split_once('/') else {
         return Err(EndpointError::Form(endpoint.to_owned()));
@@ -72,13 +72,13 @@ fn address(endpoint: &str) -> Option<&str> {
     Some(&rest[..end])
 }
 
-/// Says why a session meets nobody where it should, until it has met somebody.
+/// Reports why a session has no peer, until it has one.
 pub(super) fn watch(session: &zenoh::Session, connect: &[String]) {
     if connect.is_empty() {
         return;
     }
     let (info, connect) = (session.info(), connect.to_vec());
-    // Where there is no thread, a wrong endpoint is silent and all else works.
+    // Without this thread a wrong endpoint is not reported, but all else works.
     let _ = std::thread::Builder::new()
         .name("zenoh endpoints".to_owned())
         .spawn(move || {
@@ -87,9 +87,9 @@ pub(super) fn watch(session: &zenoh::Session, connect: &[String]) {
                 if Instant::now() >= due {
                     for endpoint in &connect {
                         let reason = why_unreached(endpoint);
-                        // Where its keys lie is nobody's business.
+                        // The settings after `#` may have paths of private keys.
                         let plain = endpoint.split('#').next().unwrap_or_default();
-                        tracing::error!("no session with {plain}: {reason}; it is tried on");
+                        tracing::error!("no session with {plain}: {reason}; retrying");
                     }
                     due = Instant::now() + AGAIN_AFTER;
                 }
@@ -98,16 +98,16 @@ pub(super) fn watch(session: &zenoh::Session, connect: &[String]) {
         });
 }
 
-/// Whether the session has a peer or a router.
+/// Whether the session is connected to a peer or a router.
 fn meets(info: &zenoh::session::SessionInfo) -> bool {
     info.routers_zid().wait().count() + info.peers_zid().wait().count() > 0
 }
 
 fn why_unreached(endpoint: &str) -> String {
     if let Some(Err(error)) = address(endpoint).map(answers) {
-        return format!("nobody answers there ({error})");
+        return format!("no answer there ({error})");
     }
-    // It answers: what it says to a session of its own.
+    // The port answers: a separate session gives the error of Zenoh.
     let timeout = ANSWER_WITHIN.as_millis().to_string();
     let settings = [
         ("connect/timeout_ms", timeout),

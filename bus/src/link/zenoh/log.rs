@@ -1,25 +1,24 @@
-//! What a sender keeps until its receivers have taken it: who has come how far, what goes out next, what goes out
-//! again.
+//! Retransmission window of a sender: unacknowledged samples, and the position and credit of each receiver.
 //!
-//! Go-back-N, as in data links (Tanenbaum, Computer Networks, section 3.4): a receiver takes samples in their order
-//! only and says how far it has come and how much room it has; what does not arrive goes out again from there. No I/O
-//! and no clock in here.
+//! Go-back-N, as in data links (Tanenbaum, Computer Networks, section 3.4): a receiver accepts samples in order only
+//! and acknowledges its position. Its credit bounds the samples in flight. The sender retransmits from the first
+//! missing sample. This module does no I/O and reads no clock.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
 use crate::link::{Audience, Keep};
 
-/// A receiver that says nothing for so long, though something is on its way, is sent it again.
-/// Resolution: the delay after a loss, against samples that are sent twice over a slow network.
+/// Retransmission timeout; doubled after each retransmission up to [`AGAIN_AT_MOST`].
+/// Resolution: the delay after a loss, against duplicates on a slow network.
 const AGAIN_AFTER: Duration = Duration::from_millis(500);
-/// The wait doubles up to this.
+/// Upper bound on the retransmission timeout.
 const AGAIN_AT_MOST: Duration = Duration::from_secs(4);
-/// So long a sender whose source can wait does so for a receiver that the network has cut off.
+/// Longest time a pausable sender waits for a disconnected receiver.
 /// Tuned: by hand, on no recorded seeds; not swept. Longer than a switch takes to restart.
 const RETURN_WITHIN: Duration = Duration::from_mins(1);
 
-/// A sample that waits, and how many were lost right before it.
+/// An unacknowledged sample, and the number of samples lost right before it.
 #[derive(Debug, Clone, Copy)]
 struct Entry<T> {
     sequence: u64,
@@ -27,57 +26,59 @@ struct Entry<T> {
     sample: T,
 }
 
-/// What goes out next.
+/// The samples of the next message.
 #[derive(Debug, Default)]
 pub(super) struct Batch<T> {
-    /// The oldest sample that can still be had.
+    /// Sequence number of the oldest sample still available.
     pub since: u64,
-    /// How many were lost right before the first one.
+    /// Number of samples lost right before the first one.
     pub gap: u64,
-    /// One after the other, without a hole.
+    /// Consecutive samples, without a gap.
     pub samples: Vec<T>,
 }
 
-/// One receiver, as far as is known.
+/// The sender's view of one receiver.
 #[derive(Debug)]
 struct Reader {
-    /// The network reaches it.
+    /// Connected.
     there: bool,
-    /// It has taken all before this one.
+    /// Sequence number of the first unacknowledged sample.
     next: u64,
-    /// How many it has room for.
+    /// Credit \[samples\].
     room: u64,
-    /// When it came, went or took something last.
+    /// Time of the last connection, disconnection or progress.
     moved: Instant,
-    /// When something was sent to it again, and how long is waited before that is done once more.
+    /// Start of the current retransmission timeout.
     again: Instant,
+    /// Current retransmission timeout.
     wait: Duration,
-    /// It has taken nothing for the sender's patience: it holds up nobody any more.
+    /// Stalled for longer than the stall timeout; no longer exerts back-pressure.
     given_up: bool,
-    /// Samples that it has found lost.
+    /// Samples that the receiver has reported as lost.
     lost: u64,
 }
 
-/// See above.
+/// A sender's retransmission window.
 #[derive(Debug)]
 pub(super) struct Log<T> {
     keep: Keep,
-    /// How many receivers are expected.
+    /// Number of expected receivers.
     expected: usize,
+    /// Stall timeout.
     patience: Duration,
-    /// How many samples may wait.
+    /// Capacity \[samples\].
     most: usize,
     entries: VecDeque<Entry<T>>,
-    /// Number of the next sample.
+    /// Sequence number of the next new sample.
     next: u64,
     /// Samples lost since the last one.
     skipped: u64,
-    /// Number of the sample that goes out next.
+    /// Sequence number of the next sample to send.
     cursor: u64,
-    /// The number of the end mark.
+    /// Sequence number of the end mark.
     end: Option<u64>,
     readers: BTreeMap<String, Reader>,
-    /// What those did not get that have gone or never came.
+    /// Samples never delivered to receivers that disconnected or never connected.
     undelivered: u64,
 }
 
@@ -98,29 +99,29 @@ impl<T: Copy> Log<T> {
         }
     }
 
-    /// The number of the next sample.
+    /// Sequence number of the next new sample.
     pub(super) fn next(&self) -> u64 {
         self.next
     }
 
-    /// How many samples have not gone out yet.
+    /// Number of samples not sent yet.
     pub(super) fn waiting(&self) -> usize {
         usize::try_from(self.next.saturating_sub(self.cursor)).unwrap_or(usize::MAX)
     }
 
-    /// How many receivers are missing.
+    /// Number of expected receivers that are not connected.
     pub(super) fn missing(&self) -> usize {
         let there = self.readers.values().filter(|reader| reader.there).count();
         self.expected.saturating_sub(there)
     }
 
-    /// Samples that those who keep all did not get, as far as they have said.
+    /// Samples that keep-all receivers did not get, including those that they have reported as lost.
     pub(super) fn undelivered(&self) -> u64 {
         let lost = self.readers.values().map(|reader| reader.lost);
         self.undelivered + lost.sum::<u64>()
     }
 
-    /// Whether a sender that can wait waits for room.
+    /// Whether a pausable sender must wait for room.
     pub(super) fn is_full(&self, now: Instant) -> bool {
         let Some(oldest) = self.entries.front() else {
             return false;
@@ -138,13 +139,13 @@ impl<T: Copy> Log<T> {
         self.entries.len() >= self.most && waited_for
     }
 
-    /// So many samples are lost before they could be sent.
+    /// Advances the sequence by `count` samples lost before they could be sent.
     pub(super) fn skip(&mut self, count: u64) {
         self.next += count;
         self.skipped += count;
     }
 
-    /// Appends a sample; if there is no room, the oldest gives way.
+    /// Appends a sample, and discards the oldest if the window is full.
     pub(super) fn push(&mut self, sample: T) {
         self.append(sample);
         if self.keep == Keep::All {
@@ -182,8 +183,8 @@ impl<T: Copy> Log<T> {
         *gap += oldest.gap + 1;
     }
 
-    /// A receiver is there, or there again, with room for `room` samples. One that has come for another that was lost
-    /// goes on where that was.
+    /// Adds a receiver that has connected or reconnected, with a credit of `room` samples. A receiver that replaces a
+    /// lost one resumes at its position.
     pub(super) fn join(&mut self, id: &str, room: u64, now: Instant) {
         if let Some(reader) = self.readers.get_mut(id) {
             reader.there = true;
@@ -217,7 +218,7 @@ impl<T: Copy> Log<T> {
         self.readers.insert(id.to_owned(), reader);
     }
 
-    /// The network does not reach a receiver any more, or it is dead. One that nobody expected is forgotten.
+    /// Marks a receiver as disconnected, by a network failure or a crash. Removes one beyond the expected number.
     pub(super) fn lose(&mut self, id: &str, now: Instant) {
         if self.readers.len() > self.expected {
             self.leave(id);
@@ -229,14 +230,15 @@ impl<T: Copy> Log<T> {
         }
     }
 
-    /// A receiver has left in order.
+    /// Removes a receiver that has disconnected normally.
     pub(super) fn leave(&mut self, id: &str) {
         let gone = self.readers.remove(id);
         self.undelivered += gone.map_or(0, |reader| reader.lost);
         self.trim();
     }
 
-    /// A receiver has taken all before `next` but for those it has found lost; whether it misses what was sent already.
+    /// Processes the acknowledgement of all samples before `next`, of which `lost` were lost. With `misses`, the
+    /// receiver requests a retransmission.
     pub(super) fn taken(&mut self, id: &str, (next, lost): (u64, u64), misses: bool, now: Instant) {
         let Some(reader) = self.readers.get_mut(id) else {
             return;
@@ -244,7 +246,7 @@ impl<T: Copy> Log<T> {
         if self.keep == Keep::All {
             reader.lost = lost.min(self.next);
         }
-        // Nobody has taken what was not sent.
+        // An acknowledgement cannot go beyond the newest sample.
         let next = next.min(self.next);
         if next > reader.next {
             reader.wait = AGAIN_AFTER;
@@ -254,7 +256,7 @@ impl<T: Copy> Log<T> {
             reader.again = now;
         }
         reader.given_up = false;
-        // It may have begun anew.
+        // The position may go back: the receiver may have restarted.
         reader.next = next;
         if misses {
             reader.again = now;
@@ -263,7 +265,7 @@ impl<T: Copy> Log<T> {
         self.trim();
     }
 
-    /// Forgets what all have taken.
+    /// Drops the samples that all receivers have acknowledged.
     fn trim(&mut self) {
         let taken = match self.keep {
             Keep::All => self.readers.values().map(|reader| reader.next).min(),
@@ -278,14 +280,14 @@ impl<T: Copy> Log<T> {
         }
     }
 
-    /// How many have not taken the end; one that the network has cut off may come back.
+    /// Number of receivers that have not acknowledged the end, including disconnected ones, which may reconnect.
     pub(super) fn untaken(&self) -> usize {
         let Some(end) = self.end else { return 0 };
         let readers = self.readers.values();
         readers.filter(|reader| reader.next <= end).count()
     }
 
-    /// The sender leaves: what they have not taken, they will not get.
+    /// Drops all samples when the sender shuts down, and counts the unacknowledged ones as undelivered.
     pub(super) fn abandon(&mut self) {
         if self.keep == Keep::All {
             let all = self.end.unwrap_or(self.next);
@@ -295,12 +297,12 @@ impl<T: Copy> Log<T> {
         self.entries.clear();
     }
 
-    /// Whether all that waits has been taken.
+    /// Whether the window is empty.
     pub(super) fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
 
-    /// What goes out next, at most `most` samples in one go; nothing while nobody has room.
+    /// Returns the next samples to send, at most `most`; `None` without samples or without credit.
     pub(super) fn batch(&mut self, most: usize, now: Instant) -> Option<Batch<T>> {
         let limit = self.limit(now);
         let since = self.entries.front()?.sequence;
@@ -327,7 +329,7 @@ impl<T: Copy> Log<T> {
         (!batch.samples.is_empty()).then_some(batch)
     }
 
-    /// The first sample that does not go out yet.
+    /// Sequence number of the first sample beyond the credit of the receivers.
     fn limit(&mut self, now: Instant) -> u64 {
         if self.keep == Keep::Newest || self.readers.is_empty() {
             return u64::MAX;
@@ -343,11 +345,11 @@ impl<T: Copy> Log<T> {
                 limit = Some(limit.map_or(end, |limit: u64| limit.min(end)));
             }
         }
-        // While nobody is there it waits here.
+        // Without an active receiver, the samples stay in the window.
         limit.unwrap_or(0)
     }
 
-    /// Goes back to what a receiver should have said something about by now.
+    /// Moves the cursor back to the first sample whose retransmission timeout has expired.
     pub(super) fn look_back(&mut self, now: Instant) {
         let mut from = self.cursor;
         for reader in self.readers.values_mut() {

@@ -1,17 +1,17 @@
-//! What goes over the network, as bytes.
+//! Encoding of the messages on the network.
 
 use crate::sample::Sample;
 
-/// Beside the samples of one message.
+/// Attachment of a message of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Beside {
-    /// Which life of the sender.
+    /// Session epoch of the sender.
     pub instance: u64,
-    /// The oldest sample that can still be had.
+    /// Sequence number of the oldest sample still available.
     pub since: u64,
-    /// How many were lost right before the first one.
+    /// Number of samples lost right before the first one.
     pub gap: u64,
-    /// How many samples all earlier lives of the sender had.
+    /// Number of samples in all earlier sessions of the sender.
     pub former: u64,
 }
 
@@ -31,26 +31,26 @@ impl Beside {
     }
 }
 
-/// What a receiver says of itself.
+/// An acknowledgement from a receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Taken {
-    /// The life of the sender that it hears.
+    /// Session epoch of the sender.
     pub instance: u64,
-    /// It has taken all before this one,
+    /// Sequence number expected next.
     pub next: u64,
-    /// but for so many that it has found lost in this life of the sender.
+    /// Number of samples before `next` that are lost, within this session of the sender.
     pub lost: u64,
-    /// Why it says so.
+    /// Reason of the acknowledgement.
     pub why: Why,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Why {
-    /// It has taken some.
+    /// Progress.
     Took,
-    /// Something did not arrive.
+    /// A missing sample.
     Misses,
-    /// It leaves.
+    /// Disconnection of the receiver.
     Leaves,
 }
 
@@ -71,7 +71,7 @@ impl Taken {
     }
 }
 
-/// The samples of a payload, or how many bytes are there instead.
+/// Decodes the samples of a payload. The error is the length of a payload that has none.
 pub(super) fn samples<T: Sample>(payload: &[u8]) -> Result<Vec<T>, usize> {
     if payload.is_empty() || !payload.len().is_multiple_of(size_of::<T>()) {
         return Err(payload.len());

@@ -18,13 +18,13 @@ use crate::link::sequence::Tracker;
 use crate::link::{Keep, LinkError, MAX_DEPTH, Position, Received, Receiver, ReceiverCounts};
 use crate::sample::Sample;
 
-/// A receiver says so often how far it has come, unless a quarter of its room is taken.
-/// Resolution: the sender's memory, against the traffic: each word costs as much as a message of samples.
+/// Interval of acknowledgements; they are sent earlier when a quarter of the credit is used.
+/// Resolution: the sender's memory, against traffic: an acknowledgement costs as much as a message of samples.
 const TELL_EVERY: Duration = Duration::from_millis(100);
-/// It says so often at most that it misses something.
-/// Resolution: the delay after a loss, against what is sent twice.
+/// Shortest interval between acknowledgements that report a missing sample.
+/// Resolution: the delay after a loss, against duplicates.
 const MISSES_EVERY: Duration = Duration::from_millis(20);
-/// One that hears nothing repeats it so often.
+/// Interval at which an idle receiver repeats its acknowledgement.
 const TELL_AGAIN: Duration = Duration::from_secs(1);
 
 pub(super) struct ZenohReceiver<T: Sample> {
@@ -32,18 +32,18 @@ pub(super) struct ZenohReceiver<T: Sample> {
     keep: Keep,
     depth: usize,
     heard: Arc<Heard<T>>,
-    // In this order, so that a sender that hears of the one can reach the other.
+    // Dropped in this order: while a sender sees the token, the subscribers receive its samples.
     _token: LivelinessToken,
     _subscribers: [Subscriber<()>; 2],
     back: Publisher<'static>,
     tracker: Tracker,
-    /// What it said last, and when.
+    /// Last acknowledged position, and its time.
     told: Option<(Position, Instant)>,
-    /// What was lost before the sender's present life.
+    /// Samples lost before the sender's current session.
     lost_before: u64,
 }
 
-/// A sample with what went beside it.
+/// A sample with the attachment of its message.
 struct Incoming<T> {
     since: u64,
     gap: u64,
@@ -51,7 +51,7 @@ struct Incoming<T> {
     sample: T,
 }
 
-/// What the network has brought.
+/// State that the Zenoh callbacks update.
 struct Heard<T> {
     stream: String,
     queue: Queue<Incoming<T>>,
@@ -66,7 +66,8 @@ impl<T: Sample> Heard<T> {
         self.speakers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes what has come; what its sender did not send is counted, and said once.
+    /// Queues the samples of a message. Messages that are not from the stream's sender are refused and counted, with
+    /// a warning for the first one.
     fn take(&self, message: &zenoh::sample::Sample) {
         let stream = &self.stream;
         let beside = message.attachment();
@@ -81,8 +82,8 @@ impl<T: Sample> Heard<T> {
         else {
             if self.foreign.fetch_add(1, Ordering::Relaxed) == 0 {
                 tracing::warn!(
-                    "stream `{stream}`: somebody who is not its sender puts messages there: they are refused and \
-                     counted"
+                    "stream `{stream}`: messages that are not from its sender are refused and counted; another program \
+                     publishes on its key"
                 );
             }
             return;
@@ -99,7 +100,7 @@ impl<T: Sample> Heard<T> {
                 if self.refused.fetch_add(1, Ordering::Relaxed) == 0 {
                     let (expected, size) = (T::KIND.type_name(), size_of::<T>());
                     tracing::warn!(
-                        "stream `{stream}` carries {found}, expected {expected} of {size} bytes: it is refused and \
+                        "stream `{stream}` carries {found}, expected {expected} of {size} bytes: refused and \
                          counted; run the same version on all hosts"
                     );
                 }
@@ -118,7 +119,7 @@ impl<T: Sample> Heard<T> {
                 },
             };
             gap = 0;
-            // What has no room is asked for again, or, where the newest are kept, counted as lost.
+            // Under `Keep::All` a sample without room is requested again; under `Keep::Newest` the oldest is lost.
             self.queue.push(message, Duration::ZERO);
         }
     }
@@ -188,7 +189,7 @@ impl<T: Sample> ZenohReceiver<T> {
         })
     }
 
-    /// Whether the sample is the next one that can be had; if not, it comes again.
+    /// Whether the sample is the next one available. Otherwise sends an acknowledgement, at a limited rate.
     fn is_next(&mut self, message: &Message<Incoming<T>>) -> Result<bool, LinkError> {
         if self.keep == Keep::Newest {
             return Ok(true);
@@ -196,7 +197,7 @@ impl<T: Sample> ZenohReceiver<T> {
         let next = match self.tracker.position() {
             None => return Ok(true),
             Some(position) if position.instance == message.instance => position.next,
-            // A new life counts from 0.
+            // A new session counts from 0.
             Some(_) => 0,
         };
         let Incoming { since, gap, .. } = message.payload;
@@ -211,7 +212,7 @@ impl<T: Sample> ZenohReceiver<T> {
         Ok(true)
     }
 
-    /// Says how far it has come, if that is due.
+    /// Sends an acknowledgement, if one is due.
     fn tell_progress(&mut self, received: Received) -> Result<(), LinkError> {
         let Some(position) = self.tracker.position() else {
             return Ok(());
@@ -283,7 +284,7 @@ impl<T: Sample> Receiver<T> for ZenohReceiver<T> {
                 instance,
                 next: message.sequence,
             };
-            // Those who keep the newest have lost what gave way since the first one came.
+            // A keep-newest receiver has lost the samples discarded since its first one.
             let begin = match self.keep {
                 Keep::All => Some(begin),
                 Keep::Newest => self.heard.queue.begin(),
@@ -333,7 +334,7 @@ impl<T: Sample> Drop for ZenohReceiver<T> {
         };
         let position = self.tracker.position().unwrap_or(nowhere);
         let taken = self.taken(position, Why::Leaves);
-        // If it does not get through, the sender finds its token gone.
+        // If this message is lost, the sender notices that the token is gone.
         let _ = self.back.put(taken.bytes()).wait();
     }
 }

@@ -15,29 +15,29 @@ use super::{Zenoh, data_key, encoding, last_chunk, open_error, policy, zenoh_rea
 use crate::link::{Audience, Keep, LinkError, Sender, SenderCounts, SpillSettings};
 use crate::sample::{Sample, flags};
 
-/// Most bytes of one message: what fits into one batch of Zenoh, so that it is never split.
-/// Resolution: how much is sent twice after a loss.
+/// Largest message \[bytes\]: it fits into one batch of Zenoh, so that it is never fragmented.
+/// Resolution: amount of data retransmitted after a loss.
 const MESSAGE_BYTES: usize = 48 << 10;
-/// Samples that wait for those who keep the newest before the oldest gives way; half of them go out without waiting for
-/// more.
-/// Resolution: memory, against how often a message goes out.
+/// Window for keep-newest receivers \[samples\], beyond which the oldest sample is discarded. Half of it is sent
+/// without batching delay.
+/// Resolution: memory, against the number of messages.
 const NEWEST: usize = 64;
-/// How often it is looked for what did not arrive.
+/// Poll interval for unacknowledged samples.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// A sender with a log before the network and a thread of its own, which begins with the first sample.
+/// A sender with a retransmission window and a thread of its own, which starts with the first sample.
 pub(super) struct ZenohSender<T: Sample> {
     stream: String,
     shared: Arc<Shared<T>>,
-    /// Until the thread has it.
+    /// Network ends, until the thread takes them.
     wire: Option<Wire>,
     settings: SpillSettings,
-    /// Shows that it lives; gone first, so that its next life is heard.
+    /// Liveliness token; dropped first, so that receivers accept the next session of the sender.
     token: Option<LivelinessToken>,
     sent: u64,
 }
 
-/// The ends of a sender in the network.
+/// Network ends of a sender.
 struct Wire {
     publisher: Publisher<'static>,
     instance: u64,
@@ -48,30 +48,30 @@ struct Wire {
 
 struct Shared<T> {
     state: Mutex<State<T>>,
-    /// There is something to send, or to look for.
+    /// Wakes the sending thread: new samples, acknowledgements or receivers.
     filled: Condvar,
-    /// There is more room, or somebody else is there.
+    /// Wakes the stage: more room, or a change of the receivers.
     changed: Condvar,
 }
 
-/// What the thread does that sends.
+/// State of the sending thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Thread {
     Sends,
-    /// It waits to be woken.
+    /// Waiting for a notification.
     Idle,
-    /// It waits for more, so that one message carries several samples; only what is urgent wakes it.
+    /// Waiting for more samples to fill a message; of new samples, only urgent ones or a full message end this wait.
     Gathers,
-    /// It is not to wait any more.
+    /// Sending without batching delay.
     Hurries,
 }
 
 struct State<T> {
     log: Log<T>,
     thread: Thread,
-    /// So many samples go out without waiting for more.
+    /// Number of samples that are sent without batching delay.
     enough: usize,
-    /// Nobody sends any more; what waits is given so long.
+    /// Time at which the sender was dropped; the thread then ends after `PATIENCE` at the latest.
     closed: Option<Instant>,
     failure: Option<LinkError>,
 }
@@ -106,7 +106,7 @@ impl<T: Sample> ZenohSender<T> {
             .declare_publisher(data_key(stream, keep))
             .encoding(encoding(T::KIND))
             .congestion_control(CongestionControl::Drop)
-            // What is to go together is put as one message; nothing waits for what may come after it.
+            // The sender itself batches samples into messages, so Zenoh must not wait for further messages.
             .express(true)
             .wait()
             .map_err(failed)?;
@@ -128,7 +128,7 @@ impl<T: Sample> ZenohSender<T> {
             })
             .wait()
             .map_err(failed)?;
-        // A receiver that hears of the one can be heard by the other.
+        // Declared after the subscriber: a receiver that sees the token can send acknowledgements.
         let token = session
             .liveliness()
             .declare_token(format!("{stream}/@from/{instance:016x}"))
@@ -168,11 +168,11 @@ impl<T: Sample> ZenohSender<T> {
         });
         started.map(|_| ()).map_err(|error| LinkError::Send {
             stream: self.stream.clone(),
-            reason: format!("no thread for what waits to be sent: {error}"),
+            reason: format!("cannot start the sending thread: {error}"),
         })
     }
 
-    /// The log, once a sender that can wait has room.
+    /// Locks the state. A pausable sender first waits for room in its window.
     fn room(&mut self) -> Result<MutexGuard<'_, State<T>>, LinkError> {
         self.start()?;
         let mut state = self.shared.lock();
@@ -185,7 +185,7 @@ impl<T: Sample> ZenohSender<T> {
         }
     }
 
-    /// Waits until `count` is 0 or for `timeout`, and returns it.
+    /// Waits until `count` is 0, at most for `timeout`, and returns the last count.
     fn until_none(&self, timeout: Duration, count: impl Fn(&Log<T>) -> usize) -> usize {
         let deadline = Instant::now() + timeout;
         let mut state = self.shared.lock();
@@ -204,7 +204,7 @@ fn most_of_a_message<T>() -> usize {
     (MESSAGE_BYTES / size_of::<T>()).max(1)
 }
 
-/// Hears who listens.
+/// Subscribes to the liveliness tokens of the receivers.
 fn presence<T: Sample>(
     session: &zenoh::Session,
     stream: &str,
@@ -288,7 +288,7 @@ impl<T: Sample> Sender<T> for ZenohSender<T> {
 }
 
 impl<T: Sample> Drop for ZenohSender<T> {
-    /// What waits is still sent; a process that exits takes it along.
+    /// The thread still sends the samples of the window, unless the process exits first.
     fn drop(&mut self) {
         self.token = None;
         let mut state = self.shared.lock();
@@ -311,7 +311,7 @@ impl<T: Sample> Shared<T> {
         self.changed.notify_all();
     }
 
-    /// Sends what waits until nobody sends any more.
+    /// Sends the samples of the window until the sender is dropped.
     fn pump(&self, wire: &Wire, linger: Duration) -> Result<(), String> {
         let most = most_of_a_message::<T>();
         let mut not_before = None;
@@ -332,7 +332,7 @@ impl<T: Sample> Shared<T> {
         Ok(())
     }
 
-    /// What goes out next, no sooner than so long after what went out before, unless it is urgent; none at the end.
+    /// Waits for the next batch, unless urgent at least until `not_before`; `None` at the end.
     fn next(&self, most: usize, not_before: Option<Instant>) -> Option<Batch<T>> {
         let mut state = self.lock();
         loop {
@@ -341,7 +341,7 @@ impl<T: Sample> Shared<T> {
             let left = not_before.map_or(Duration::ZERO, |at| at.saturating_duration_since(now));
             let hurries = state.thread == Thread::Hurries || state.closed.is_some();
             if !left.is_zero() && !hurries && state.log.waiting() < state.enough {
-                // What the receivers say wakes this thread, too.
+                // Acknowledgements wake this thread as well.
                 state.thread = Thread::Gathers;
                 state = wait(&self.filled, state, left);
                 continue;
@@ -367,7 +367,7 @@ impl<T: Sample> Shared<T> {
 }
 
 impl<T> State<T> {
-    /// What waits is to go out at once. Whether the thread must be woken for that.
+    /// Ends the batching delay. Returns whether the thread must be woken.
     fn hurry(&mut self) -> bool {
         let before = std::mem::replace(&mut self.thread, Thread::Hurries);
         matches!(before, Thread::Idle | Thread::Gathers)

@@ -1,29 +1,29 @@
-//! Who may speak on a stream.
+//! Sender check: the session from which a receiver accepts samples.
 
 use std::collections::HashSet;
 
-/// The lives of the stream's sender. A sender that lives shows a token; while it does, nobody else is heard, and who
-/// shows none is not heard at all.
+/// Sessions of a stream's sender. A live session has a liveliness token. A new session is accepted only with a token,
+/// and only after the current one has ended its stream or lost its token.
 #[derive(Debug, Default)]
 pub(super) struct Speakers {
     alive: HashSet<u64>,
     present: Option<u64>,
-    /// The present one has ended its stream.
+    /// The current session has ended its stream.
     ended: bool,
 }
 
 impl Speakers {
-    /// A token has appeared.
+    /// Registers the token of a session.
     pub(super) fn appeared(&mut self, instance: u64) {
         self.alive.insert(instance);
     }
 
-    /// A token has gone. What that sender has left on its way is still heard.
+    /// Removes the token of a session. Its samples in transit are still accepted.
     pub(super) fn gone(&mut self, instance: u64) {
         self.alive.remove(&instance);
     }
 
-    /// Whether that one may speak now.
+    /// Whether samples of this session are accepted now.
     pub(super) fn hears(&mut self, instance: u64) -> bool {
         if self.present == Some(instance) {
             return true;
@@ -38,12 +38,12 @@ impl Speakers {
         true
     }
 
-    /// An earlier life of this receiver has heard that one.
+    /// Sets the session from which an earlier incarnation of this receiver accepted samples.
     pub(super) fn resume(&mut self, instance: u64) {
         self.present.get_or_insert(instance);
     }
 
-    /// That one has ended its stream.
+    /// Marks the stream of a session as ended.
     pub(super) fn ends(&mut self, instance: u64) {
         self.ended |= self.present == Some(instance);
     }

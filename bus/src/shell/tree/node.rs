@@ -1,4 +1,4 @@
-//! The stages of a tree and where their samples go.
+//! The stages of a group, and the routing of their samples.
 
 use std::time::{Duration, Instant};
 
@@ -11,10 +11,10 @@ use crate::shell::pulse::Pulse;
 use crate::shell::report::{InputReport, Report};
 use crate::stage::{Emit, Stage, StageError};
 
-/// Where a stage's samples go: to the stages of its tree that hear it, and over links to all others.
+/// Output of a stage: to the stages of its group that receive it, and over links to all others.
 pub struct Outlet<'a, T: Sample> {
     branches: Vec<Box<dyn Branch<T> + 'a>>,
-    /// None where nobody else hears it.
+    /// `None` without receivers outside the group.
     link: Option<Box<dyn Sender<T> + 'a>>,
     slot: T,
     sent: u64,
@@ -24,7 +24,7 @@ pub struct Outlet<'a, T: Sample> {
 }
 
 impl<'a, T: Sample> Outlet<'a, T> {
-    /// To these stages, in this order, and over `link`.
+    /// An output to these stages, in this order, and over `link`.
     pub fn new(
         branches: Vec<Box<dyn Branch<T> + 'a>>,
         link: Option<Box<dyn Sender<T> + 'a>>,
@@ -40,7 +40,7 @@ impl<'a, T: Sample> Outlet<'a, T> {
         }
     }
 
-    /// The header of what was emitted last since this was asked before.
+    /// Takes the header of the newest sample emitted since the last call.
     pub(super) fn take_newest(&mut self) -> Option<Header> {
         self.newest.take()
     }
@@ -64,7 +64,7 @@ impl<'a, T: Sample> Outlet<'a, T> {
         link.map_or(Ok(0), |link| link.wait_until_taken(left))
     }
 
-    /// Ends the stream for all that hear it.
+    /// Ends the stream for all receivers.
     fn end(&mut self) -> Result<(), StageError> {
         if let Some(link) = &mut self.link {
             link.end()?;
@@ -108,7 +108,7 @@ impl<T: Sample> Emit<T> for Outlet<'_, T> {
         *newest = Some(*slot.header());
         *sent += 1;
         ledger.emitted(*sent, slot.header());
-        // No detector waits for what a recorder is told.
+        // Stages of the group first: a detector must not wait for a recorder at the other end of the link.
         let heard = branches.iter_mut().try_for_each(|branch| {
             branch.hear(slot)?;
             branch.tell()
@@ -120,9 +120,9 @@ impl<T: Sample> Emit<T> for Outlet<'_, T> {
     }
 }
 
-/// A stage of a tree and all behind it, as whoever hands it samples sees it.
+/// A stage of a group and all stages behind it, as seen by the preceding stage.
 pub trait Branch<I> {
-    /// Takes a sample.
+    /// Processes a sample.
     ///
     /// # Errors
     /// If the stage or one behind it fails.
@@ -131,56 +131,56 @@ pub trait Branch<I> {
     /// Sends a health report if one is due.
     ///
     /// # Errors
-    /// What the link says.
+    /// If the link fails.
     fn tell(&mut self) -> Result<(), LinkError>;
 
-    /// The stage without its types.
+    /// The stage without its sample types.
     fn part(&mut self) -> &mut dyn Part;
 }
 
-/// A stage of a tree, whatever its types are.
+/// A stage of a group, independent of its sample types.
 pub trait Part {
-    /// Brings its report up to date.
+    /// Updates the report.
     fn count(&mut self);
 
-    /// Its report as it was brought up to date last.
+    /// The report as of the last update.
     fn report(&self) -> &Report;
 
-    /// The part of it that says how its input fares.
+    /// The report of the input; `None` for a source.
     fn input(&mut self) -> Option<&mut InputReport>;
 
-    /// Keeps what that part says.
+    /// Records the report of the input in the ledger.
     fn keep_input(&mut self);
 
-    /// Waits until all who hear it over links are there; how many are missing.
+    /// Waits until the receivers over links are connected, and returns the number of missing ones.
     ///
     /// # Errors
     /// If a link fails.
     fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError>;
 
-    /// Its input has ended: so does its stream.
+    /// Finishes the stage and ends its stream, after the end of its input.
     ///
     /// # Errors
-    /// If it, or one behind it, cannot finish.
+    /// If the stage, or one behind it, cannot finish.
     fn finish(&mut self) -> Result<(), StageError>;
 
-    /// Waits until all have read to the end.
+    /// Waits until all receivers have read to the end.
     ///
     /// # Errors
     /// If a link fails.
     fn wait_until_taken(&mut self, deadline: Instant) -> Result<(), LinkError>;
 
-    /// Each stage that hears it.
+    /// Visits each stage that receives its stream.
     ///
     /// # Errors
-    /// The first that `visit` gives.
+    /// The first error of `visit`.
     fn behind(
         &mut self,
         visit: &mut dyn FnMut(&mut dyn Part) -> Result<(), LinkError>,
     ) -> Result<(), LinkError>;
 }
 
-/// Visits a part and all behind it.
+/// Visits a stage and all stages behind it.
 pub(super) fn walk(
     part: &mut dyn Part,
     visit: &mut dyn FnMut(&mut dyn Part) -> Result<(), LinkError>,
@@ -189,7 +189,7 @@ pub(super) fn walk(
     part.behind(&mut |behind| walk(behind, visit))
 }
 
-/// What all stages of a tree have: their streams, their report and their health.
+/// Common parts of all stages of a group: output, report and health.
 pub(super) struct Frame<'a, O: Sample> {
     pub place: usize,
     pub turn: Turn,
@@ -228,7 +228,7 @@ impl<'a, O: Sample> Frame<'a, O> {
         }
     }
 
-    /// Brings the report up to date, but for what the stage itself knows.
+    /// Updates the report, except for the values that only the stage itself knows.
     pub fn count(&mut self, refused: u64) {
         self.report.refused = refused;
         self.report.count_output(self.out.counts());
@@ -265,7 +265,7 @@ struct Node<'a, I: Sample, O: Sample> {
     stage: Box<dyn Stage<I, O> + 'a>,
 }
 
-/// A stage with all that hear it in its tree.
+/// A stage with all stages of its group behind it.
 pub fn branch<'a, I: Sample, O: Sample>(
     turn: &Turn,
     post: Post<'a>,

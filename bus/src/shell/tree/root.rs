@@ -1,4 +1,4 @@
-//! What a tree grows from: a source, or a link.
+//! The root of a stage group: a source, or a link.
 
 use std::time::{Duration, Instant};
 
@@ -10,19 +10,19 @@ use crate::shell::TICK;
 use crate::shell::report::{InputReport, Outcome, Report};
 use crate::stage::{Progress, Source, StageError};
 
-/// How long a source that has nothing now is left alone.
-/// Resolution: the delay of a sample, against how often the process wakes up.
+/// Sleep after a step in which a source has no data.
+/// Resolution: the delay of a sample, against the number of wake-ups.
 const IDLE: Duration = Duration::from_millis(1);
-/// How often a source is asked whether it is in trouble.
+/// Interval at which a source is checked for trouble.
 const ASK_EVERY: Duration = Duration::from_millis(500);
 
-/// What gives a tree its samples.
+/// Origin of the samples of a stage group.
 pub(super) trait Root {
-    /// Begins to hear, where it hears.
+    /// Opens the input link, if there is one.
     fn open(&mut self) -> Result<(), LinkError>;
-    /// Lets the next samples through; how it ended, if it did.
+    /// Processes the next samples, and returns the outcome at the end.
     fn turn(&mut self, stopped: bool) -> Result<Option<Outcome>, StageError>;
-    /// Brings up to date what only it knows of its stage.
+    /// Updates the part of the first stage's report that only the root knows.
     fn count(&mut self);
     fn part(&mut self) -> &mut dyn Part;
 }
@@ -30,9 +30,9 @@ pub(super) trait Root {
 pub(super) struct SourceRoot<'a, T: Sample> {
     frame: Frame<'a, T>,
     source: Box<dyn Source<T> + 'a>,
-    /// When the newest sample went out, or the start.
+    /// Time of the newest sample, or of the start.
     emitted: Instant,
-    /// When the source was last asked whether it is in trouble.
+    /// Time of the last check for trouble.
     asked: Instant,
 }
 
@@ -51,7 +51,7 @@ impl<'a, T: Sample> SourceRoot<'a, T> {
         }
     }
 
-    /// Asks the source now and then whether it is in trouble; one that gives samples again is asked at once.
+    /// Checks the source for trouble at a fixed interval, and at once when it emits samples again.
     fn ask(&mut self, emitted: bool) {
         let now = Instant::now();
         if emitted {
@@ -151,9 +151,9 @@ pub(super) struct Linked<'a, I: Sample> {
     first: Box<dyn Branch<I> + 'a>,
     open: Option<Opening<'a, I>>,
     input: Option<Box<dyn Receiver<I> + 'a>>,
-    /// The stream that it hears has ended.
+    /// The input stream has ended.
     ended: bool,
-    /// Once it is to stop: most samples that it still takes.
+    /// Largest number of samples to process after a stop request.
     left_to_take: usize,
 }
 
@@ -177,7 +177,7 @@ impl<I: Sample> Root for Linked<'_, I> {
         Ok(())
     }
 
-    /// Until the input ends, or, once it is to stop, has nothing more that arrived before.
+    /// Ends with the input or, after a stop request, once the samples that have arrived are processed.
     fn turn(&mut self, stopped: bool) -> Result<Option<Outcome>, StageError> {
         let Some(input) = &mut self.input else {
             return Ok(Some(Outcome::Stopped));

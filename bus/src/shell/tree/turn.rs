@@ -1,4 +1,4 @@
-//! Whose turn it is in a tree, and who failed.
+//! The current stage of a stage group, and the stage that failed.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -7,29 +7,29 @@ use crate::link::LinkError;
 use crate::shell::pulse::Pulse;
 use crate::stage::StageError;
 
-/// Shared by the stages of one tree, which run in one thread.
+/// State shared by the stages of one group, which run in one thread.
 #[derive(Debug, Clone, Default)]
 pub struct Turn(Rc<State>);
 
 #[derive(Debug, Default)]
 struct State {
-    /// Where one panicked, it stays at that one.
+    /// Stays at a stage that has panicked.
     pulse: Pulse,
     failure: RefCell<Option<(usize, StageError)>>,
 }
 
 impl Turn {
-    /// A number for the stage of that name.
+    /// Registers a stage, and returns its index.
     pub(super) fn place(&self, name: &str) -> usize {
         self.0.pulse.place(name)
     }
 
-    /// The same for other threads.
+    /// The heartbeat, for other threads.
     pub(super) fn pulse(&self) -> Pulse {
         self.0.pulse.clone()
     }
 
-    /// The stage at `place` does its work, perhaps within the work of the one before it.
+    /// Runs the work of the stage at `place`, possibly nested in the work of the preceding stage.
     pub(super) fn of(
         &self,
         place: usize,
@@ -37,7 +37,7 @@ impl Turn {
     ) -> Result<(), LinkError> {
         let result = self.0.pulse.turn_of(place, work);
         result.map_err(|error| {
-            // Those before it pass on that it failed; what it said itself stays.
+            // Preceding stages pass the failure on; the original error is kept.
             let mut failure = self.0.failure.borrow_mut();
             failure.get_or_insert((place, error));
             LinkError::Send {
@@ -47,12 +47,12 @@ impl Turn {
         })
     }
 
-    /// Whose turn it is.
+    /// Name of the current stage.
     pub(super) fn whose(&self) -> String {
         self.0.pulse.whose()
     }
 
-    /// Fails if a stage has failed, though those before it did not pass it on.
+    /// Fails if a stage has failed, even if the preceding stages did not pass the failure on.
     pub(super) fn check(&self) -> Result<(), StageError> {
         match &*self.0.failure.borrow() {
             Some((place, _)) => Err(StageError::Link(LinkError::Send {
@@ -63,7 +63,7 @@ impl Turn {
         }
     }
 
-    /// Which stage failed, and of what; `error` is what came up to the loop.
+    /// Returns the failed stage and its error. `error` is the one that reached the run loop.
     pub(super) fn failure(&self, error: StageError) -> (String, StageError) {
         match self.0.failure.take() {
             Some((place, error)) => (self.name(place), error),

@@ -1,34 +1,34 @@
-//! The numbers of an effect: parameters, as files and reports hold them, and coordinates, which a fit searches.
+//! Parameters of an effect, for files and reports, and coordinates, for a fit.
 
 use crate::terms::words::unit;
 
-/// A parameter of an effect, as files hold it.
+/// A parameter of an effect in files.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
     /// Canonical name, with its unit.
     pub name: &'static str,
-    /// Its unit; empty for a pure number.
+    /// Unit; empty for a pure number.
     pub unit: &'static str,
-    /// The least value that is physically possible.
+    /// Smallest physically possible value.
     pub minimum: f64,
-    /// What it is where a file does not give it; `None` if it must be given.
+    /// Value if a file does not give it; `None` if it must be given.
     pub default: Option<f64>,
 }
 
-/// A number that a fit searches.
+/// A coordinate that a fit searches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coordinate {
-    /// For messages and tests.
+    /// Name for messages and tests.
     pub name: &'static str,
-    /// How it enters the effort.
+    /// Role in the effort.
     pub kind: CoordinateKind,
 }
 
 impl Parameter {
-    /// A parameter that a file must give. Its name must end in its unit: what does not is a [`Parameter::ratio`].
+    /// A mandatory parameter. Its name must end in its unit; a parameter without unit is a [`Parameter::ratio`].
     ///
     /// # Panics
-    /// If the name does not end in a unit: when a constant is compiled, not later.
+    /// At compile time, if the name does not end in a unit.
     pub const fn at_least(name: &'static str, minimum: f64) -> Self {
         let Some((_, unit)) = unit(name) else {
             panic!("the name of a parameter ends in its unit");
@@ -41,7 +41,7 @@ impl Parameter {
         }
     }
 
-    /// A pure number that a file must give.
+    /// A mandatory pure number.
     pub const fn ratio(name: &'static str, minimum: f64) -> Self {
         Self {
             name,
@@ -51,12 +51,12 @@ impl Parameter {
         }
     }
 
-    /// A parameter of any value that a file must give.
+    /// A mandatory parameter of any value.
     pub const fn any(name: &'static str) -> Self {
         Self::at_least(name, f64::NEG_INFINITY)
     }
 
-    /// The same, but a file may leave it out.
+    /// Makes the parameter optional, with this default.
     #[must_use]
     pub const fn or(self, default: f64) -> Self {
         Self {
@@ -120,27 +120,27 @@ impl Coordinate {
     }
 }
 
-/// How a coordinate enters the effort.
+/// Role of a coordinate in the effort.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CoordinateKind {
-    /// As a factor, exactly or to first order about 0: with all factors 0 (and some shape) the term does
-    /// nothing, or what its shape alone does. `step` is small enough for a difference quotient (1 where
-    /// it is exact); the fitted value may not be below `minimum`.
+    /// Linear factor, exactly or to first order about 0: with all factors 0 (and some shape) the term has no effect,
+    /// or only that of its shape. `step` is small enough for a difference quotient (1 if the effort is exactly
+    /// linear); the fitted value may not be below `minimum`.
     Factor {
         /// Step of the difference quotient.
         step: f64,
-        /// The least value that is physically possible.
+        /// Smallest physically possible value.
         minimum: f64,
     },
-    /// In any other way: searched between `lower` and `upper`.
+    /// Nonlinear shape, searched between `lower` and `upper`.
     Shape {
-        /// Lowest value worth a try.
+        /// Lowest value of the search.
         lower: f64,
-        /// Highest value worth a try.
+        /// Highest value of the search.
         upper: f64,
-        /// How many values to try first.
+        /// Number of values of the initial grid.
         steps: usize,
-        /// How they are spread.
+        /// Spacing of the grid.
         scale: Scale,
     },
     /// A time within each recording \[s from its start\].
@@ -149,12 +149,12 @@ pub enum CoordinateKind {
     SessionTime,
 }
 
-/// How values of a shape are spread.
+/// Spacing of the grid of a shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
-    /// Evenly.
+    /// Even.
     Linear,
-    /// Evenly, as waves over a turn of the joint: no more than its positions resolve.
+    /// Even, as waves over a turn of the joint: no more than its positions resolve.
     Waves,
     /// By a constant ratio.
     Log,

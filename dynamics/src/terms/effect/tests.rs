@@ -1,4 +1,4 @@
-//! Every effect says what there is to know of it.
+//! Tests that the description of every effect is complete and consistent.
 
 use std::collections::BTreeSet;
 
@@ -53,7 +53,7 @@ fn every_parameter_has_the_unit_of_its_name() {
     }
 }
 
-/// Its coordinates if its shapes end their ranges and the parameters `numbers` are 1, all else being 0.
+/// Coordinates with all shapes at an end of their range, the parameters `numbers` at 1, and all others at 0.
 fn at_end(effect: &Effect, numbers: &[&str], upper_end: bool) -> Vec<f64> {
     let shape = |c: &Coordinate| match c.kind {
         CoordinateKind::Shape { lower, upper, .. } => {
@@ -126,7 +126,7 @@ fn what_few_effects_have_fits_them() {
         assert!(!only_adds || effect.layer == Layer::Record);
         assert!(!effect.traits.describes_only || effect.concealed.is_none());
     }
-    // What has a name can be concealed, unless that depends on the URDF or on the recordings.
+    // Every named effect can be concealed, unless it depends on the URDF or on the recordings.
     let plain = EFFECTS
         .iter()
         .filter(|e| e.concealed.is_none() && !e.traits.describes_only);

@@ -1,14 +1,14 @@
-//! What keeps a spec from being a term.
+//! Errors of building a term from a spec.
 
-/// Why a term cannot be built.
+/// Reason why a term cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TermError {
-    /// There is no such effect.
+    /// The effect does not exist.
     #[error("there is no effect `{effect}`; known are: {known}")]
     UnknownEffect {
         /// The name given.
         effect: String,
-        /// The names there are.
+        /// The existing names.
         known: String,
     },
     /// The robot has no such joint.
@@ -31,7 +31,7 @@ pub enum TermError {
         /// The robot's links.
         known: String,
     },
-    /// It is not said where the effect is.
+    /// The place of the effect is missing.
     #[error("`{effect}` needs the key `{key}`")]
     MissingPlace {
         /// The effect.
@@ -46,7 +46,7 @@ pub enum TermError {
         effect: &'static str,
         /// The name given.
         parameter: String,
-        /// The names there are.
+        /// The existing names.
         known: String,
     },
     /// A parameter is not given.
@@ -57,7 +57,7 @@ pub enum TermError {
         /// The parameter.
         parameter: &'static str,
     },
-    /// A value that cannot be.
+    /// A value that is impossible.
     #[error("`{parameter}` of `{effect}` is {value}, it must be {expected}")]
     OutOfRange {
         /// The effect.
@@ -66,25 +66,25 @@ pub enum TermError {
         parameter: &'static str,
         /// The value given.
         value: f64,
-        /// What is possible.
+        /// Possible values.
         expected: String,
     },
-    /// An effect with parameters was given a table.
+    /// An effect with parameters has a table.
     #[error("`{effect}` has no table")]
     NoTable {
         /// The effect.
         effect: &'static str,
     },
-    /// An unknown effect without its curve.
+    /// An `unknown` effect has no table.
     #[error("`{effect}` needs a table")]
     MissingTable {
         /// The effect.
         effect: &'static str,
     },
-    /// The curve is none.
+    /// The table is not a valid curve.
     #[error("the table's {reason}")]
     Table {
-        /// What is wrong with it.
+        /// The fault of the table.
         reason: &'static str,
     },
 }

@@ -1,4 +1,4 @@
-//! Regressions on what two simulations of one arm may differ by at a joint.
+//! Regressions on the expected differences between two simulations of one arm at a joint.
 
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::sign;
@@ -6,11 +6,11 @@ use tauscope_dynamics::terms::sign;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
 
-/// Added to the diagonal of the scaled normal equations, which is 1.
+/// Ridge added to the diagonal of the scaled normal equations, which is 1.
 /// Resolution: guards the inverse of dependent columns.
 const RIDGE: f64 = 1e-6;
 
-/// A number of each sample and joint as a signal.
+/// Filters a function of sample and joint into a signal.
 fn signal_of(problem: &Problem, value: impl Fn(&Track, usize) -> f64) -> Vec<f64> {
     let n = problem.joints;
     let of = |track: &Track| (0..n * track.len()).map(|at| value(track, at)).collect();
@@ -18,7 +18,8 @@ fn signal_of(problem: &Problem, value: impl Fn(&Track, usize) -> f64) -> Vec<f64
     problem.signal(&all)
 }
 
-/// What two simulations of one arm may differ by at a joint: an offset, Coulomb and viscous friction.
+/// Returns the columns in which two simulations of one arm may differ at a joint: an offset, Coulomb and viscous
+/// friction.
 pub fn plain_columns(problem: &Problem) -> Vec<Vec<f64>> {
     vec![
         signal_of(problem, |_, _| 1.0),
@@ -27,7 +28,8 @@ pub fn plain_columns(problem: &Problem) -> Vec<Vec<f64>> {
     ]
 }
 
-/// The same with what effects in a joint depend on: acceleration, position and the twin's effort.
+/// Returns [`plain_columns`] and the variables that effects in a joint depend on: acceleration, position and the
+/// twin's effort.
 pub fn rich_columns(problem: &Problem) -> Vec<Vec<f64>> {
     let mut columns = plain_columns(problem);
     columns.push(signal_of(problem, |track, at| track.acceleration[at]));
@@ -36,7 +38,7 @@ pub fn rich_columns(problem: &Problem) -> Vec<Vec<f64>> {
     columns
 }
 
-/// What a regression on `columns` with these weights leaves of `signal` at a joint, at all rows.
+/// Returns the residual of the weighted regression of `signal` on `columns` at a joint, at all rows.
 pub fn regressed(
     problem: &Problem,
     columns: &[Vec<f64>],
@@ -55,7 +57,8 @@ pub fn regressed(
     left
 }
 
-/// The factors of that regression; none if the columns are dependent.
+/// Returns the coefficients of the weighted regression of `signal` on `columns` at a joint; none if the columns are
+/// dependent.
 pub fn factors(
     problem: &Problem,
     columns: &[Vec<f64>],
@@ -87,9 +90,9 @@ pub fn factors(
     (0..p).map(|a| theta[a] / scale[a]).collect()
 }
 
-/// Effective number of independent rows among those with weight: `n (1 - r) / (1 + r)` with r the correlation of neighbouring
-/// rows (Bayley and Hammersley, "The 'Effective' Number of Independent Observations in an Autocorrelated Time Series",
-/// 1946).
+/// Returns the effective number of independent rows among those with weight: `n (1 - r) / (1 + r)` with r the
+/// correlation of neighbouring rows (Bayley and Hammersley, "The 'Effective' Number of Independent Observations in an
+/// Autocorrelated Time Series", 1946).
 pub fn independent_rows(left: &[f64], weight: &[f64]) -> f64 {
     let (mut product, mut square) = (0.0, f64::MIN_POSITIVE);
     for (x, w) in left.windows(2).zip(weight.windows(2)) {
@@ -101,13 +104,13 @@ pub fn independent_rows(left: &[f64], weight: &[f64]) -> f64 {
     (1.0 - r) / (1.0 + r) * weight.iter().sum::<f64>()
 }
 
-/// The middle one; 0 of none.
+/// Returns the upper median; 0 without values.
 pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// From the 1 % to the 99 % quantile.
+/// Returns the distance between the 1 % and the 99 % quantile.
 pub fn range(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! Rows at which another simulation's joint moves in one direction and the real joint in another, or not at all.
+//! Rows in which the joint of an external twin moves in one direction and the real joint in another, or not at all.
 
 use crate::data::noise::MEDIAN_OF_ABS_NORMAL;
 use crate::data::problem::Problem;
@@ -6,32 +6,32 @@ use crate::data::track::Track;
 
 use super::regression::{median, range, regressed, rich_columns};
 
-/// Time over which the other simulation's effort jumps when its friction turns \[s\].
+/// Duration of the jump of the external twin's effort when its friction reverses \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const JUMP_S: f64 = 0.06;
-/// A jump is this many times what the effort changes just before and after.
+/// Smallest ratio of a jump to the change of the effort just before and after.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const JUMP_TIMES: f64 = 3.0;
-/// And at least this share of the range of the joint's effort.
+/// Smallest size of a jump, relative to the range of the joint's effort.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const JUMP_SHARE: f64 = 0.02;
-/// The real joint follows the command within this time \[s\].
+/// Time within which the real joint follows the command \[s\].
 /// Physical: a controller without integral part creeps for a second at most.
 const FOLLOWS_S: f64 = 1.0;
-/// A row is left out if its error is this many standard deviations of the calm half of the rows.
+/// Error above which a row is excluded, in standard deviations of the calmer half of the rows.
 /// Statistical: a normal variable exceeds that once in 16 000 rows.
 const LEFT_OUT: f64 = 4.0;
-/// A joint is fast above this share of its 90 % quantile of speed: there its friction and the command's have one sign.
+/// Speed, relative to the joint's 90 % quantile, above which its friction and that of the command have the same sign.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const FAST: f64 = 0.3;
-/// No row is left out where the joint is faster than this share of that quantile.
+/// Speed, relative to the joint's 90 % quantile, above which no row is excluded.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const NEVER: f64 = 0.6;
-/// Rounds of the regression without the rows that it left out.
+/// Iterations of the regression, each without the rows excluded by the last.
 /// Resolution: further rounds change no row.
 const ROUNDS: usize = 4;
 
-/// Leaves out the rows at which the other simulation's friction acts in another direction than the real one: near one of
+/// Excludes the rows in which the external twin's friction acts in another direction than the real one: near one of
 /// its jumps, where the real joint is slow, and where no function of the joint's own state explains the error.
 pub fn leave_out_other_states(problem: &mut Problem) {
     let columns = rich_columns(problem);
@@ -63,13 +63,13 @@ pub fn leave_out_other_states(problem: &mut Problem) {
     problem.weight = kept;
 }
 
-/// The rows of a joint near jumps of the other simulation's effort.
+/// The rows of a joint near jumps of the external twin's effort.
 struct Slow {
-    /// Whether a row is near a jump, and the joint not fast there.
+    /// Whether a row is near a jump and the joint is not fast there.
     near: Vec<bool>,
     /// Speed by row \[rad/s\].
     speed: Vec<f64>,
-    /// The 90 % quantile of speed where rows count \[rad/s\].
+    /// 90 % quantile of the speed over the compared rows \[rad/s\].
     usual: f64,
 }
 
@@ -98,7 +98,7 @@ fn slow_near_jumps(problem: &Problem, joint: usize) -> Slow {
     Slow { near, speed, usual }
 }
 
-/// When the other simulation's effort of a joint jumps \[s\].
+/// Returns the times of the jumps of the external twin's effort at a joint \[s\].
 fn jumps_s(track: &Track, joint: usize, n: usize) -> Vec<f64> {
     let own: Vec<f64> = track.rigid.iter().skip(joint).step_by(n).copied().collect();
     let least = JUMP_SHARE * range(&own);

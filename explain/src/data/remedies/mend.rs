@@ -1,4 +1,4 @@
-//! Remedies applied to recordings, and predictions brought back to what was recorded.
+//! Application of remedies to recordings, and of their inverses to predictions.
 
 use tauscope_dynamics::JointKind;
 
@@ -7,7 +7,7 @@ use crate::read::input::Input;
 use crate::read::recording::Recording;
 
 impl Input {
-    /// Applies remedies to the recordings, or to what is said of them.
+    /// Applies remedies to the recordings, or to their declared units and constants.
     pub fn mend(&mut self, slips: &[Slip]) {
         for slip in slips {
             let n = self.model.dof();
@@ -36,7 +36,7 @@ impl Input {
     }
 }
 
-/// Positions in degrees are put in rad; so are velocities, if they are the change of these positions.
+/// Converts positions from degrees to rad; velocities too, if they are the change of these positions.
 fn in_radians(recording: &mut Recording, turning: &[usize], n: usize) {
     let in_degrees = velocity::slope(recording, turning, n).is_some_and(|slope| slope > 0.5);
     let to_rad = std::f64::consts::PI / 180.0;
@@ -73,7 +73,7 @@ impl Remedy {
                 }
             }
             Self::EffortTurned(j) => scale(&mut recording.effort, j, n, -1.0),
-            // One number throughout is no measurement, and is left out.
+            // A constant effort is no measurement, and is left out.
             Self::EffortWithoutSign(j) => scale(&mut recording.effort, j, n, 0.0),
             Self::PositionTurned(j) | Self::JointTurned(j) => {
                 scale(&mut recording.position, j, n, -1.0);
@@ -95,7 +95,7 @@ impl Remedy {
         }
     }
 
-    /// From efforts of mended recordings back to the recorded columns: rows of `n` numbers.
+    /// Converts efforts of corrected recordings back to the recorded columns: rows of `n` numbers.
     pub fn undo(&self, rows: &mut [f64], n: usize) {
         match *self {
             Self::Swapped(a, b) | Self::NamesSwapped(a, b) => {

@@ -1,33 +1,33 @@
-//! Efforts that are a common factor off, in another unit, or divided by wrong torque constants.
+//! Detection of efforts with a common scale error, in another unit, or divided by wrong torque constants.
 
 use tauscope_dynamics::effort_scale::EffortScale;
 
 use super::{Remedy, Slip};
 use crate::read::input::Input;
 
-/// Slopes of an arm are the same if each is within this factor of the middle one.
+/// Largest factor between the slope of a joint and the median slope of an arm with a common scale.
 /// Physical: masses of published URDFs are within a tenth of the real ones, and a gravity torque sums several.
 const SAME: f64 = 1.2;
-/// The same for a factor that a body which the URDF lacks might have.
-/// Physical: a payload weighs on each joint by another share of what the joint bears without it.
+/// Largest factor from the median slope where a body that the URDF lacks could explain the scale.
+/// Physical: a payload loads each joint by a different share of its load without it.
 const SAME_NEAR_1: f64 = 1.1;
-/// A common factor further from 1 than this is none of the masses of an arm.
+/// Smallest distance of a common scale from 1, as a factor: errors in the masses of an arm are smaller.
 /// Physical: as [`SAME`]; all bodies of an arm are not wrong by a third in the same direction.
 const OFF: f64 = 1.4;
-/// Joints that must agree.
+/// Smallest number of joints with the same scale.
 /// Physical: one joint's factor is that of its own drive.
 const LEAST_JOINTS: usize = 2;
-/// Every joint measures at least so many times the torque that the motion requires.
+/// Smallest ratio of measured to required torque, at every joint, of an effort relative to a rating.
 /// Physical: per cent and per mille of ratings up to 1000 N m are above it.
 const LEAST_RATING: f64 = 3.0;
-/// The same where fewer joints than [`LEAST_JOINTS_NEAR_1`] tell.
+/// Smallest such ratio where fewer than [`LEAST_JOINTS_NEAR_1`] joints are informative.
 /// Physical: no arm carries ten times its own weight.
 const RATING_OF_FEW: f64 = 10.0;
-/// The same for a factor that a wrong body might have, too.
+/// Smallest number of joints with the same scale where a wrong body could explain it.
 /// Physical: a wrong mass of the last link weighs on two joints alike.
 const LEAST_JOINTS_NEAR_1: usize = 3;
 
-/// What is wrong with the scale of efforts, given the slope of measured over required effort by joint that tells.
+/// Returns the fault of the scale of efforts, given the slope of measured over required effort by informative joint.
 pub fn of_scale(input: &Input, slopes: &[(usize, f64)]) -> Option<Slip> {
     let mut sorted: Vec<f64> = slopes.iter().map(|(_, slope)| *slope).collect();
     sorted.sort_by(f64::total_cmp);
@@ -63,7 +63,7 @@ pub fn of_scale(input: &Input, slopes: &[(usize, f64)]) -> Option<Slip> {
     })
 }
 
-/// Whether these slopes, in order, are shares of ratings: each far above what the masses of an arm may be off.
+/// Whether these slopes, in ascending order, are those of efforts relative to ratings: each far above 1.
 fn of_rating(sorted: &[f64]) -> bool {
     let least = if sorted.len() < LEAST_JOINTS_NEAR_1 {
         RATING_OF_FEW
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
     use crate::fixture::model;
 
-    /// What is wrong with efforts in `unit` that have these slopes, given torque constants or not.
+    /// Returns the fault of efforts in `unit` with these slopes, with torque constants or without.
     fn wrong(unit: &str, has_constants: bool, slopes: &[f64]) -> Option<Remedy> {
         let input = Input {
             case: String::new(),
@@ -137,7 +137,7 @@ mod tests {
     fn per_mille_of_what_each_joint_is_rated_for_is_told() {
         let slopes = [12.0, 3.6, 8.1, 25.0];
         assert_eq!(wrong("Nm", false, &slopes), Some(Remedy::IsOfRating));
-        // One joint is as required: that is a body.
+        // One joint is as required, so a body is wrong.
         assert_eq!(wrong("Nm", false, &[12.0, 1.1, 8.1, 25.0]), None);
     }
 

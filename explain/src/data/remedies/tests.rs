@@ -7,7 +7,7 @@ use super::*;
 use crate::fixture::{self, Noise};
 use crate::read::recording::Recording;
 
-/// What is found in two recordings of the small arm, with friction, that `spoil` has changed.
+/// Returns the audit of two recordings of the small arm, with friction, after `spoil` has changed them.
 fn found(spoil: impl Fn(&mut Recording)) -> Audit {
     let model = fixture::model();
     let mut noise = Noise(7);
@@ -40,7 +40,7 @@ fn what_fits_needs_no_remedy() {
     assert_eq!(remedies(found(|_| {})), []);
 }
 
-/// An arm whose last joint turns a round body: its position hardly matters.
+/// An arm whose last joint turns a round body: its position hardly affects the effort.
 const ROUND_TOOL: &str = r#"<robot name="round"><link name="base"/>
   <link name="upper"><inertial><origin xyz="0 0 0.2"/><mass value="4"/>
     <inertia ixx="0.06" iyy="0.06" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
@@ -52,8 +52,8 @@ const ROUND_TOOL: &str = r#"<robot name="round"><link name="base"/>
     <axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="3" effort="5"/></joint>
 </robot>"#;
 
-/// The twin of yesterday, in which the first joint had a spring that is gone today: the URDF alone fits better, but that is
-/// no reason to turn a joint.
+/// Yesterday's twin, in which the first joint had a spring that is gone today: the URDF alone fits better, but that
+/// is no reason to turn a joint.
 #[test]
 fn what_a_twin_has_beside_its_urdf_stays_while_remedies_are_tried() {
     let model = Model::from_urdf(ROUND_TOOL).unwrap();
@@ -130,7 +130,7 @@ fn swapped_efforts_turned_signs_and_degrees_are_told() {
             turn(all, 0);
         }
     }));
-    // Seen in a mirror, this arm with one joint turned is the one with the other turned.
+    // In a mirror, this arm with one joint turned equals the arm with the other joint turned.
     assert!(matches!(counts[..], [Remedy::JointTurned(_)]), "{counts:?}");
     let degrees = remedies(found(|r| {
         let angles = r.position.iter_mut().chain(&mut r.velocity);
@@ -237,7 +237,7 @@ fn an_effort_that_a_quiet_joint_cannot_need_is_no_remedy() {
         })
     };
     let before = [left(9.0, 10.0, true), left(0.01, 0.01, false)];
-    // The quiet joint gets an effort that its motion leaves: the error only moves.
+    // The quiet joint gets an effort that its motion does not explain: the error only moves.
     let moved = [left(0.01, 0.01, false), left(9.0, 10.0, true)];
     assert_eq!(total_gain(&before, &moved), None);
     // Its motion needs that effort.

@@ -1,4 +1,4 @@
-//! The fit of a robot to the data after a change, beside offset, gain, Coulomb and viscous friction in each joint.
+//! Fit of a changed robot or reading to the data, with an offset, a gain, Coulomb and viscous friction in each joint.
 
 mod base_turned;
 mod without_sign;
@@ -12,20 +12,21 @@ use crate::data::problem::Problem;
 use crate::data::track::STANDSTILL_RAD_S;
 use crate::data::track::Track;
 
-/// A joint tells if its effort varies by at least this many times the noise, and is compared with this many rows.
+/// Smallest variation of the effort of an informative joint, in standard deviations of the noise, and its smallest
+/// number of compared rows.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const STRONG: f64 = 5.0;
 const LEAST_ROWS: usize = 20;
-/// A measured torque is between these times the required one: gain errors of sensors and wrong bodies.
+/// Bounds of measured over required torque: gain errors of sensors and wrong bodies.
 /// Physical: as `effort_scale::SURE_SCALE`.
 const GAINS_OF_TORQUE: [f64; 2] = [0.5, 2.0];
-/// A current may be any share of the torque, of the same sign.
+/// Bounds of measured current over required torque: any scale of the same sign.
 /// Physical: torque constants are positive.
 const GAINS_OF_CURRENT: [f64; 2] = [0.0, f64::INFINITY];
-/// No arm carries more than this many times its own mass, and no link is wrong by more.
+/// Largest mass of a payload, or error of a link's mass, relative to the mass of the arm.
 /// Physical: light arms carry as much as they weigh; the rest is for a URDF that is too light.
 const BEARS: f64 = 4.0;
-/// Added to the diagonal of the normal equations, as a share of their trace.
+/// Ridge added to the diagonal of the normal equations, relative to their trace.
 /// Resolution: far above the rounding of f64, far below what the noise hides.
 const RIDGE: f64 = 1e-9;
 
@@ -34,27 +35,27 @@ pub(super) struct Trial<'a> {
     problem: &'a Problem,
     /// Limits of the slope of measured over required effort.
     gains: [f64; 2],
-    /// By joint, the rows that count.
+    /// Compared rows by joint.
     rows: Vec<Vec<Counted>>,
 }
 
-/// A row of a joint that counts.
+/// A compared row of a joint.
 struct Counted {
     row: usize,
     recording: usize,
     velocity: f64,
 }
 
-/// What a model leaves of a joint's measured effort, beside friction and a gain.
+/// The residual of a joint's measured effort after a model with friction and a gain.
 #[derive(Debug, Clone)]
 pub(super) struct Left {
-    /// Sum of squares by recording, no less than that of the noise.
+    /// Sum of squares by recording, not below that of the noise.
     pub squares: Vec<f64>,
-    /// Rows.
+    /// Number of rows.
     pub count: f64,
-    /// Sum of squares that friction alone leaves.
+    /// Sum of squares after friction alone.
     pub beside_friction: f64,
-    /// Whether the effort varies far above its noise: only then the joint says what is wrong.
+    /// Whether the joint is informative: its effort varies far above its noise.
     pub tells: bool,
 }
 
@@ -64,12 +65,12 @@ impl Left {
         (self.squares.iter().sum::<f64>() / self.count).sqrt()
     }
 
-    /// Whether the motion leaves much of an effort that tells.
+    /// Whether the motion leaves much of an informative effort unexplained.
     pub fn is_suspect(&self) -> bool {
         self.tells && self.share() > SUSPECT
     }
 
-    /// Share of the variance beside friction that is left.
+    /// Returns the share of the variance after friction that is unexplained.
     pub fn share(&self) -> f64 {
         self.squares.iter().sum::<f64>() / self.beside_friction
     }
@@ -90,14 +91,14 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// The efforts over the motion that `of` gives for each track, as a signal.
+    /// Evaluates `of` for each track and filters the efforts into a signal.
     fn efforts(&self, mut of: impl FnMut(&Track) -> Vec<f64>) -> Vec<f64> {
         let tracks = self.problem.tracks.iter();
         let efforts: TrackEfforts = tracks.map(|track| of(&track.track)).collect();
         self.problem.signal(&efforts)
     }
 
-    /// The twin's effort, as a signal, for the positions and the gravity of a reading.
+    /// Computes the twin's effort, as a signal, for the positions and the gravity of a reading.
     pub fn model(&self, reading: &Reading) -> Vec<f64> {
         let mut model = self.problem.model.clone();
         if !reading.weighs {
@@ -118,14 +119,14 @@ impl<'a> Trial<'a> {
         })
     }
 
-    /// By joint, what `model` leaves of the effort that a reading takes for its. Nothing for joints with hardly any row.
+    /// Returns the residual of `model` by joint for the efforts of a reading. `None` for joints with hardly any row.
     pub fn left(&self, model: &[f64], reading: &Reading) -> Vec<Option<Left>> {
         let of = |joint: usize| self.left_of(joint, model, reading);
         (0..self.problem.joints).map(of).collect()
     }
 
     fn left_of(&self, joint: usize, model: &[f64], reading: &Reading) -> Option<Left> {
-        // Its motion, and the rows that count by it, stand where its position does.
+        // Its motion and its compared rows are those of the column with its position.
         let rows = &self.rows[reading.place[joint]];
         let from = self.problem.joint_rows(reading.column[joint]).start;
         let own = self.problem.joint_rows(joint).start;
@@ -149,7 +150,7 @@ impl<'a> Trial<'a> {
             return None;
         }
         let residual = self.residual(&friction, &measured, &required, self.is_known(joint));
-        // No sum is zero, not even where a recording has no row that counts.
+        // Keeps every sum above zero, even without compared rows in a recording.
         let mut squares = vec![noise * noise; self.problem.tracks.len()];
         for (row, error) in rows.iter().zip(residual.iter()) {
             squares[row.recording] += error * error + noise * noise;
@@ -162,7 +163,7 @@ impl<'a> Trial<'a> {
         })
     }
 
-    /// Whether the twin has friction of the joint already: there may be less of it.
+    /// Whether the twin already contains friction of the joint, which the fit may then reduce.
     fn is_known(&self, joint: usize) -> bool {
         let mut known = self.problem.known_friction[joint].keys();
         known.any(|name| {
@@ -171,7 +172,8 @@ impl<'a> Trial<'a> {
         })
     }
 
-    /// What a gain within its limits and friction that takes power leave. What is known of the friction may be too much.
+    /// Returns the residual after a gain within its bounds and dissipative friction. Where friction `is_known`, the
+    /// correction may be negative.
     fn residual(
         &self,
         friction: &DMatrix<f64>,
@@ -192,7 +194,7 @@ impl<'a> Trial<'a> {
             least_squares(friction, &(measured - gain * required))
         };
         let (numbers, left) = fitted(friction);
-        // Averaged over the motion.
+        // The power of friction, averaged over the motion.
         let power = friction.column(1).dot(&friction.column(2)) * numbers[1]
             + friction.column(2).norm_squared() * numbers[2];
         if power >= 0.0 || is_known {
@@ -202,13 +204,14 @@ impl<'a> Trial<'a> {
         fitted(&offset).1
     }
 
-    /// Physics that may be behind all that does not match, with the effort that the robot then needs.
+    /// Returns physics that may explain the whole mismatch, each with the effort of the changed robot.
     pub fn physics(&self) -> Vec<(Remedy, Vec<f64>)> {
         let all = [self.base_turned(), self.payload()];
         all.into_iter().flatten().collect()
     }
 
-    /// The factors of `columns` (signals) beside friction that make the twin's effort fit best, and that effort.
+    /// Fits the coefficients of `columns` (signals), with friction in each joint, and returns them with the resulting
+    /// effort of the twin.
     fn fitted(&self, start: &[f64], columns: &[Vec<f64>]) -> Option<(DVector<f64>, Vec<f64>)> {
         let p = columns.len();
         let (mut normal, mut right) = (DMatrix::zeros(p, p), DVector::zeros(p));
@@ -245,13 +248,14 @@ impl<'a> Trial<'a> {
         Some((factors, model))
     }
 
-    /// Mass of the body on the tool that fits best.
+    /// Returns the mass of the best-fitting body on the tool.
     fn payload(&self) -> Option<(Remedy, Vec<f64>)> {
         let (found, loaded) = self.with_body(self.problem.model.tool_link())?;
         (found[0] > 0.0 && self.is_bearable(&found)).then_some((Remedy::Payload(found[0]), loaded))
     }
 
-    /// Whether a body is no heavier than [`BEARS`] times the arm by its URDF, and no further out than a metre.
+    /// Whether a body has at most [`BEARS`] times the mass of the arm in the URDF, and first moments of at most that
+    /// times 1 m.
     fn is_bearable(&self, body: &DVector<f64>) -> bool {
         let arm_kg: f64 = self.problem.model.links().iter().map(Link::mass_kg).sum();
         body.rows(0, 4)
@@ -259,7 +263,8 @@ impl<'a> Trial<'a> {
             .all(|moment| moment.abs() < BEARS * arm_kg)
     }
 
-    /// Whether one link of another mass, centre or inertia than in the URDF makes all efforts torques of the motion.
+    /// Whether one link with another mass, centre or inertia than in the URDF makes all efforts torques of the
+    /// motion.
     pub fn is_one_body(&self) -> bool {
         let reading = Reading::as_recorded(self.problem.joints);
         let explains = |(found, model): (DVector<f64>, Vec<f64>)| {
@@ -270,7 +275,7 @@ impl<'a> Trial<'a> {
         joints.any(|joint| self.with_body(joint.child_link).is_some_and(explains))
     }
 
-    /// The ten parameters of a body on a link that fit best, and the effort that the robot then needs.
+    /// Fits the ten inertial parameters of a body on a link, and returns them with the resulting effort of the robot.
     fn with_body(&self, link: usize) -> Option<(DVector<f64>, Vec<f64>)> {
         let robot = &self.problem.model;
         let unit = |k: usize| {
@@ -292,7 +297,7 @@ impl<'a> Trial<'a> {
     }
 }
 
-/// The rows of a joint that count.
+/// Returns the compared rows of a joint.
 fn counted(problem: &Problem, joint: usize) -> Vec<Counted> {
     let counted = |(recording, row, k): (usize, usize, usize)| Counted {
         row,
@@ -302,13 +307,13 @@ fn counted(problem: &Problem, joint: usize) -> Vec<Counted> {
     problem.counted(joint).map(counted).collect()
 }
 
-/// Columns of an offset, the direction and the speed, where positions are multiplied by `factor`.
+/// Returns the columns of an offset, the direction and the velocity, where positions are multiplied by `factor`.
 fn friction(rows: &[Counted], factor: f64) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), 3, |row, column| {
         let velocity = factor * rows[row].velocity;
         match column {
             0 => 1.0,
-            // As recorded, so that each reading has the same standstills.
+            // At the recorded velocity, so that each reading has the same standstills.
             1 if rows[row].velocity.abs() < STANDSTILL_RAD_S => 0.0,
             1 => velocity.signum(),
             _ => velocity,
@@ -316,7 +321,7 @@ fn friction(rows: &[Counted], factor: f64) -> DMatrix<f64> {
     })
 }
 
-/// Least squares of `values` on `columns`: the numbers, and what is left.
+/// Least squares of `values` on `columns`: returns the coefficients and the residual.
 fn least_squares(columns: &DMatrix<f64>, values: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
     let mut normal = columns.tr_mul(columns);
     for at in 0..columns.ncols() {

@@ -1,31 +1,31 @@
-//! Recorded velocities that are not the change of the recorded positions.
+//! Detection of recorded velocities that differ from the change of the recorded positions.
 
 use super::{Remedy, Slip};
 use crate::data::smoother::MotionSmoother;
 use crate::read::recording::Recording;
 
-/// Both are compared below this frequency \[Hz\].
+/// Frequency below which both are compared \[Hz\].
 /// Physical: well below the filters of drives, which begin at some 15 Hz, and above the motion of an arm.
 const CUTOFF_HZ: f64 = 4.0;
-/// A velocity is wrong if it is this factor off.
+/// Smallest scale error of a wrong velocity, as a factor.
 /// Physical: the filter of a drive takes a tenth of the fastest motion at most.
 const OFF: f64 = 1.25;
-/// The factor must explain this share of the recorded velocity's square.
+/// Smallest share of the recorded velocity's square that the factor must explain.
 /// Statistical: a correlation of 0.95.
 const EXPLAINS: f64 = 0.9;
-/// Factors of joints are one factor if they are this near to each other.
+/// Largest factor between the scales of joints with a common scale.
 /// Physical: as [`OFF`].
 const SAME: f64 = 1.1;
-/// One factor of all joints is wrong from here on, if they are this near to each other: no filter slows all motions alike,
-/// but a wrong unit does, or a wrong clock.
+/// Smallest error of a scale common to all joints, and largest factor between them. No filter slows all motions
+/// equally, but a wrong unit or a wrong clock does.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const OFF_TOGETHER: f64 = 1.1;
 const SAME_TOGETHER: f64 = 1.03;
-/// A joint tells if it is this fast, RMS \[rad/s or m/s\].
+/// Smallest speed of an informative joint, RMS \[rad/s or m/s\].
 /// Tuned: by hand, on no recorded seeds; not swept. The steps of an encoder are below.
 const LEAST_SPEED: f64 = 0.03;
 
-/// What is wrong with the recorded velocities of `n` joints.
+/// Returns the faults of the recorded velocities of `n` joints.
 pub fn of_velocity(recordings: &[Recording], n: usize) -> Vec<Slip> {
     let mut sums: Vec<Sums> = (0..n).map(|_| Sums::default()).collect();
     for recording in recordings.iter().filter(|one| has_velocity(one)) {
@@ -65,7 +65,7 @@ pub fn of_velocity(recordings: &[Recording], n: usize) -> Vec<Slip> {
         .collect()
 }
 
-/// Recorded velocity per change of position, over some joints of a recording.
+/// Returns the recorded velocity over the change of position, over some joints of a recording.
 pub fn slope(recording: &Recording, joints: &[usize], n: usize) -> Option<f64> {
     let mut sums = Sums::default();
     if has_velocity(recording) {
@@ -81,14 +81,14 @@ fn has_velocity(recording: &Recording) -> bool {
     recording.velocity.len() == recording.position.len() && recording.len() > 1
 }
 
-/// Sums over the samples of a joint.
+/// Sums of products over the samples of a joint.
 #[derive(Default)]
 struct Sums {
-    /// Of the square of the change of position.
+    /// Squared change of position.
     own: f64,
-    /// Of that times the recorded velocity.
+    /// Change of position times recorded velocity.
     cross: f64,
-    /// Of the square of the recorded velocity.
+    /// Squared recorded velocity.
     recorded: f64,
     /// Number of samples.
     count: f64,
@@ -128,7 +128,8 @@ mod tests {
     use super::*;
     use crate::fixture::{model, recording};
 
-    /// What is wrong with two recordings whose velocity is `factor` times what it should be, by joint.
+    /// Returns the faults of two recordings whose velocity is multiplied by `factor`, by joint, with their number of
+    /// slopes.
     fn told(factor: [f64; 2]) -> Vec<(Remedy, usize)> {
         let model = model();
         let mut recordings = [1, 2].map(|seed| recording(&model, seed, |_, _, _| {}));
@@ -151,7 +152,7 @@ mod tests {
         assert!(one.len() == 1 && near(&one[0].0, Some(1), 0.5), "{one:?}");
         let all = told([57.3, 57.3]);
         assert!(all.len() == 1 && near(&all[0].0, None, 57.3), "{all:?}");
-        // As a filter leaves them, or a clock that is wrong.
+        // Within the attenuation by a filter; then a common factor, as of a wrong clock.
         assert!(told([0.85, 0.95]).is_empty());
         let slow = told([0.85, 0.86]);
         assert!(slow.len() == 1 && near(&slow[0].0, None, 0.855), "{slow:?}");

@@ -1,41 +1,41 @@
-//! The drive's clock behind the stamps of a recording.
+//! Reconstruction of the drive's clock from the stamps of a recording.
 //!
-//! A drive samples on an even clock. The stamps are often made later, by a busy computer or in whole milliseconds, and a
-//! smoother that believes them sees accelerations that were not there. Whether the samples or their stamps are uneven is
-//! seen in the positions: a sample that was taken late has moved on.
+//! A drive samples on an even clock. The stamps are often assigned later, by a busy computer or in whole
+//! milliseconds. A smoother that trusts them computes accelerations that did not occur. The positions show whether
+//! the samples or only their stamps are uneven: the position of a sample that was taken late has advanced.
 
 use super::Recording;
 
-/// Fewer samples show no clock.
+/// Smallest number of samples for an estimate of the clock.
 /// Resolution: one second at 200 Hz.
 const LEAST_SAMPLES: usize = 200;
-/// Share of what a stamp is off by that the phase of the clock follows.
+/// Gain of the phase correction, relative to the deviation of a stamp.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const FOLLOWED: f64 = 0.05;
-/// Stamps that are off by more than this share of the step, RMS, do not say which tick they belong to.
-/// Statistical: stamps anywhere within a step are off by the root of a twelfth.
+/// Largest RMS deviation of stamps that can be assigned to ticks, relative to the step.
+/// Statistical: stamps uniform within a step have an RMS deviation of the root of a twelfth.
 const MOST_OFF: f64 = 0.288;
-/// Stamps that are closer to an even clock than this share of the step are left as they are.
-/// Resolution: far below what a smoother over many steps can tell.
+/// RMS deviation from an even clock below which stamps are kept, relative to the step.
+/// Resolution: far below what a smoother over many steps resolves.
 const LEAST_OFF: f64 = 0.002;
-/// The samples were even if, of each stamp's deviation, the positions show less than this share.
-/// Physical: half way between none and all of it.
+/// Share of each stamp's deviation in the positions below which the samples were even.
+/// Physical: half way between no deviation and all of it.
 const SHOWN: f64 = 0.5;
-/// By so many standard deviations.
+/// Distance below that share at which the samples are accepted as even, in standard deviations.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SURE: f64 = 3.0;
 
-/// An even clock that the stamps were put back on.
+/// An even clock on which the samples were placed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EvenClock {
-    /// Time between two samples \[s\].
+    /// Sampling period \[s\].
     pub step_s: f64,
-    /// How far the stamps were off, RMS \[s\].
+    /// RMS deviation of the stamps \[s\].
     pub off_s: f64,
 }
 
 impl EvenClock {
-    /// The note of a report. `is_timed_by_log` says whether the time of recording replaces the stamps.
+    /// Returns the note for a report. `is_timed_by_log` states whether the time of recording replaces the stamps.
     pub fn note(&self, recording: &str, is_timed_by_log: bool) -> String {
         let times = if is_timed_by_log {
             "times of recording"
@@ -52,7 +52,8 @@ impl EvenClock {
 }
 
 impl Recording {
-    /// Puts the samples on the drive's even clock, if there is one and the positions say that they were taken on it.
+    /// Places the samples on the drive's even clock, if there is one and the positions show that they were taken on
+    /// it.
     pub(super) fn put_on_even_clock(&mut self) {
         let Some((ticks, clock)) = ticks(&self.time_s) else {
             return;
@@ -66,9 +67,9 @@ impl Recording {
         }
     }
 
-    /// Whether the positions show that samples were not taken when their stamps are off the even clock. Where a sample was
-    /// taken later by δ than half way between its neighbours, its position lies beside theirs by velocity times δ. The share
-    /// of δ that is seen is estimated over all samples and joints, each joint by its own noise.
+    /// Whether the positions contradict the stamps that are off the even clock. A sample taken later by δ than half
+    /// way between its neighbours differs from their mean position by velocity times δ. The share of δ in the
+    /// positions is estimated over all samples and joints, each joint weighted by its own noise.
     fn shows_less_than_half(&self, ticks: &[i64], step_s: f64) -> bool {
         let n = self.position.len() / self.len().max(1);
         let off: Vec<f64> = (ticks.iter().zip(&self.time_s))
@@ -102,7 +103,7 @@ impl Recording {
     }
 }
 
-/// For each stamp its tick of an even clock, if they are stamps of one.
+/// Assigns each stamp to a tick of an even clock, if the stamps fit one.
 fn ticks(time_s: &[f64]) -> Option<(Vec<i64>, EvenClock)> {
     if time_s.len() < LEAST_SAMPLES {
         return None;
@@ -138,7 +139,7 @@ fn ticks(time_s: &[f64]) -> Option<(Vec<i64>, EvenClock)> {
     is_clock.then_some((ticks, EvenClock { step_s, off_s }))
 }
 
-/// The straight line through stamps over their ticks: where it begins and how it rises.
+/// Fits a straight line to the stamps over their ticks; returns its intercept and slope.
 fn line(ticks: &[i64], time_s: &[f64]) -> (f64, f64) {
     let count = ticks.len() as f64;
     let mean_tick = ticks.iter().map(|tick| *tick as f64).sum::<f64>() / count;
@@ -158,7 +159,8 @@ mod tests {
     use super::*;
     use crate::fixture::{Noise, model, recording};
 
-    /// A recording of 3 ms a sample, whose samples are taken, and stamped, off the even clock by these parts of a step.
+    /// Simulates a recording with a step of 3 ms. `taken` and `stamped` are the deviations of sampling times and
+    /// stamps from the even clock, relative to the step.
     fn sampled(taken: impl Fn(usize) -> f64, stamped: impl Fn(usize) -> f64) -> Recording {
         let mut it = recording(&model(), 3, |_, _, _| {});
         let n = it.position.len() / it.len();
@@ -192,7 +194,7 @@ mod tests {
         assert!(steps.clone().all(|step| (step - 0.003).abs() < 1e-6));
     }
 
-    /// A few in two thousand stamps are late by more than half a step, and look as if they belonged to the next tick.
+    /// Some of two thousand stamps are late by more than half a step, and appear to belong to the next tick.
     #[test]
     fn stamps_that_are_late_by_more_than_half_a_step_are_put_back() {
         let mut noise = Noise(8);
@@ -220,7 +222,7 @@ mod tests {
     fn stamps_in_whole_milliseconds_are_put_back_with_their_gaps() {
         let mut it = sampled(|_| 0.0, |_| 0.0);
         let n = it.position.len() / it.len();
-        // 333 1/3 Hz would be 3 ms: the drive is a little slower, so a stamp falls behind now and then.
+        // The step is 3.003 ms instead of 3 ms, so a stamp in whole milliseconds falls behind now and then.
         let kept: Vec<usize> = (0..2000).filter(|k| k % 97 > 8).collect();
         it.position = kept
             .iter()

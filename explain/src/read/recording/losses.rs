@@ -1,17 +1,17 @@
-//! What a recording loses on reading.
+//! Losses of a recording on reading.
 
 use super::Recording;
 
 /// Messages and rows that were left out on reading.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Losses {
-    /// Messages and states that were refused; the findings name the reasons.
+    /// Refused messages and states; the findings state the reasons.
     pub refused: u64,
     /// Rows that repeat the stamp and the values of the row before.
     pub repeated: u64,
-    /// Rows of an arm that moves that repeat all values of the row before: the measurement is an old one.
+    /// Rows of a moving arm that repeat all values of the row before: an old measurement.
     pub stale: u64,
-    /// Rows whose efforts are no measurement, among others whose efforts are.
+    /// Rows whose efforts are not a measurement, in a recording with measured efforts.
     pub unmeasured: u64,
     /// Messages that could not be decoded.
     pub unreadable: u64,
@@ -20,23 +20,23 @@ pub struct Losses {
 }
 
 impl Losses {
-    /// Rows of data that are lost, repeats not counted.
+    /// Returns the number of lost rows of data, without repeats.
     pub fn lost(&self) -> u64 {
         self.refused + self.unmeasured + self.unreadable + self.damaged
     }
 }
 
 impl Recording {
-    /// Leaves out the samples that are not `measured`: nobody measured their efforts.
+    /// Removes the samples that are not `measured`, because their efforts are not a measurement.
     pub(super) fn keep_measured(&mut self, measured: &[bool]) {
         let unmeasured = measured.iter().filter(|is_measured| !**is_measured);
         self.losses.unmeasured += unmeasured.count() as u64;
         self.keep(measured);
     }
 
-    /// Leaves out the samples that repeat every value of the one before although some joint has a velocity. A driver that
-    /// publishes faster than it reads sends old measurements with new stamps; a position that waits and then catches up
-    /// has a velocity that no arm had.
+    /// Removes the samples that repeat every value of the one before although some joint has a velocity. A driver
+    /// that publishes faster than it reads sends old measurements with new stamps. A position that stops and then
+    /// catches up implies a velocity that the arm did not have.
     pub(super) fn leave_out_stale(&mut self) {
         let count = self.len();
         let n = self.position.len() / count.max(1);
@@ -59,7 +59,7 @@ impl Recording {
         }
     }
 
-    /// The samples before a time \[s\] and those from it on, as two recordings. Findings and losses are those of the first.
+    /// Splits the recording at a time \[s\] into two. Findings and losses are those of the first.
     pub(crate) fn parted(mut self, at_s: f64) -> (Self, Self) {
         let is_late: Vec<bool> = self.time_s.iter().map(|time_s| *time_s >= at_s).collect();
         let of = |recording: &mut Self, late: bool| {
@@ -76,7 +76,7 @@ impl Recording {
         (self, end)
     }
 
-    /// Keeps these samples alone. The rows of the others are answered by the sample before.
+    /// Removes the samples that are not kept. The sample before represents their rows.
     pub(crate) fn keep(&mut self, is_kept: &[bool]) {
         let n = self.position.len() / is_kept.len().max(1);
         let kept: Vec<usize> = (0..is_kept.len()).filter(|&k| is_kept[k]).collect();
@@ -120,7 +120,7 @@ mod tests {
         assert_eq!(recording.losses.stale, 2);
         assert!((recording.time_s[6] - whole.time_s[8]).abs() < 1e-12);
         assert_eq!(recording.sample_of_row[4..9], [4, 5, 5, 5, 6].map(Some));
-        // An arm at rest measures the same again.
+        // An arm at rest measures the same values again.
         still.velocity.fill(0.0);
         still.leave_out_stale();
         assert_eq!(still.len(), whole.len());

@@ -1,12 +1,13 @@
-//! The rate of a recording.
+//! Sample rate of a recording.
 
 use super::Recording;
 
-/// A longer time between two samples is a gap \[s\].
+/// Time between two samples above which it is a gap \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const MAX_GAP_S: f64 = 0.25;
 
-/// Mean time between samples, apart from gaps \[s\]: a pause makes no recording slower. All times count where each is a gap.
+/// Returns the mean time between samples without gaps, so that a pause does not lower the rate \[s\]. If every step
+/// is a gap, all are included.
 pub fn mean_step_s(time_s: &[f64]) -> f64 {
     let steps = time_s.windows(2).map(|pair| pair[1] - pair[0]);
     let (sum, count) = steps
@@ -20,12 +21,12 @@ pub fn mean_step_s(time_s: &[f64]) -> f64 {
 }
 
 impl Recording {
-    /// Samples a second, apart from gaps \[Hz\].
+    /// Returns the number of samples per second, without gaps \[Hz\].
     pub fn rate_hz(&self) -> f64 {
         1.0 / mean_step_s(&self.time_s).max(1e-6)
     }
 
-    /// Whether its samples are poses that were held: each is a gap from the next, and nothing is known of the motion between.
+    /// Whether its samples are held poses: every step is a gap, and the motion between them is unknown.
     pub fn is_of_poses(&self) -> bool {
         mean_step_s(&self.time_s) > MAX_GAP_S
     }
@@ -40,7 +41,7 @@ mod tests {
         let mut time_s: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
         time_s.extend((0..1000).map(|k| 90.0 + 0.01 * f64::from(k)));
         assert!((mean_step_s(&time_s) - 0.01).abs() < 1e-9);
-        // Of what has gaps alone, all counts.
+        // If every step is a gap, all are included.
         assert!((mean_step_s(&[0.0, 2.0, 4.0]) - 2.0).abs() < 1e-12);
         assert!(mean_step_s(&[]) <= 0.0);
     }

@@ -1,4 +1,4 @@
-//! Centres of mass where no body is: what looks like a body there is the geometry.
+//! Implausible centres of mass: an error of the geometry looks like a body there.
 
 use std::collections::BTreeMap;
 
@@ -8,24 +8,24 @@ use tauscope_dynamics::{Data, Model, forward_kinematics, link_pose};
 
 use crate::report::schema::Finding;
 
-/// The centre of what is at the tool is no further out \[m\].
+/// Largest distance of the centre of mass at the tool from the flange \[m\].
 /// Physical: grippers and spindles are shorter.
 const FURTHEST_M: f64 = 0.5;
-/// A centre that is further away is nowhere \[m\].
-/// Physical: longer than any arm; what is determined at all is nearer.
+/// Distance above which a coordinate of a centre of mass is not determined \[m\].
+/// Physical: longer than any arm; determined coordinates are smaller.
 const NOWHERE_M: f64 = 10.0;
-/// A link's centre is no further from its frame than this many times the next joint.
-/// Physical: motors stand out beyond a joint by a little.
+/// Largest distance of a link's centre from its frame, relative to that of the next joint.
+/// Physical: motors extend slightly beyond a joint.
 const BEYOND: f64 = 1.1;
-/// Another length moves the centre towards the next joint, by at least this share of the whole move.
-/// Physical: links are straight, and bodies differ across them by little.
+/// Smallest share of a centre's displacement towards the next joint if the cause is another length of the link.
+/// Physical: links are straight, and bodies vary little across them.
 const STRAIGHT: f64 = 0.95;
 
-/// Why the centre of mass of a finding cannot be where it says, if so.
+/// Returns the reason why the centre of mass of a finding is implausible, if it is.
 pub(super) fn far_out(finding: &Finding, model: &Model) -> Option<&'static str> {
     if vector(finding, "com", least).is_some_and(|com| com.norm() > FURTHEST_M) {
         return Some(
-            " So far out is no body: the tool is rather turned, or mounted elsewhere than the URDF says.",
+            " No body lies that far from the flange; more likely the tool is mounted with another orientation or at another place.",
         );
     }
     let link = model.link_index(finding.link.as_deref()?)?;
@@ -34,14 +34,14 @@ pub(super) fn far_out(finding: &Finding, model: &Model) -> Option<&'static str> 
     let (along, end_m) = (next.normalize(), BEYOND * next.norm());
     let of_urdf = Vector3::from(model.links()[link].com_m()).dot(&along);
     let moves = delta.dot(&along);
-    // A wrist's centre may be beyond its next joint in the URDF already.
+    // A wrist's centre may already be beyond its next joint in the URDF.
     let leaves = of_urdf < end_m && of_urdf + moves > end_m && moves > STRAIGHT * delta.norm();
     leaves.then_some(
         " That is beyond the next joint, where the link ends: check whether the URDF has the lengths of this arm.",
     )
 }
 
-/// Removes where the centre of a body is along an axis that the motion does not tell anything of: a fit leaves it anywhere.
+/// Removes the coordinates of a centre of mass that the motion does not determine: their estimates are arbitrary.
 pub(super) fn drop_nowhere(
     parameters: &mut BTreeMap<String, Value>,
     intervals: &mut BTreeMap<String, [f64; 2]>,
@@ -58,7 +58,7 @@ pub(super) fn drop_nowhere(
     }
 }
 
-/// The three parameters of a finding that begin so \[m\], each as `of` its value and its interval.
+/// Returns the three parameters of a finding with this prefix \[m\], each as `of` its value and its interval.
 fn vector(
     finding: &Finding,
     prefix: &str,
@@ -69,20 +69,21 @@ fn vector(
         let value = finding.parameters.get(&name).and_then(Value::as_f64)?;
         Some(of(value, finding.intervals_95.get(&name)))
     };
-    // What the recordings tell nothing of is left out.
+    // Parameters that the recordings do not determine are absent.
     let axes = ["x", "y", "z"].map(axis);
     let any = axes.iter().any(Option::is_some);
     any.then(|| axes.map(Option::unwrap_or_default).into())
 }
 
-/// The value in an interval that is nearest to zero; zero where the motion does not determine it.
+/// Returns the value in an interval that is nearest to zero; zero where the motion does not determine it.
 fn least(_: f64, interval: Option<&[f64; 2]>) -> f64 {
     interval.map_or(0.0, |[low, high]| {
         0.0_f64.clamp(low.min(*high), high.max(*low))
     })
 }
 
-/// Where the nearest joint that hangs on a link is, in the link's frame \[m\]; none at the end of an arm.
+/// Returns the position of the nearest joint that is mounted on a link, in the link's frame \[m\]; `None` at the end
+/// of an arm.
 fn next_joint(model: &Model, link: usize) -> Option<Vector3<f64>> {
     let mut data = Data::new(model);
     forward_kinematics(model, &mut data, &vec![0.0; model.dof()]);

@@ -1,22 +1,22 @@
-//! Bodies of a URDF that nobody has measured: what such a URDF shows by itself.
+//! Implausible bodies of a URDF: evidence in the URDF itself that they were not measured.
 
 use nalgebra::Matrix3;
 use tauscope_dynamics::terms::words::number;
 use tauscope_dynamics::terms::{Effect, Family};
 use tauscope_dynamics::{Link, Model};
 
-/// So many links of one mass are no chance.
-/// Statistical: masses of links are told with three digits.
+/// Smallest number of links with the same mass that is not a coincidence.
+/// Statistical: masses of links are given with three digits.
 const LEAST_ALIKE: usize = 3;
-/// Two masses are alike if they differ by less than this share.
+/// Relative difference below which two masses are equal.
 /// Resolution: that of a decimal number in a URDF.
 const ALIKE: f64 = 1e-6;
-/// What the distance from frame to centre adds to an inertia must be at least this share of its trace: of a centre near the
-/// frame the point of reference does not show.
+/// Smallest contribution of the distance between frame and centre to an inertia, relative to its trace: near the
+/// frame, the reference point cannot be determined.
 /// Physical: a rod about its end has 0.75 there, the housing of a joint about its axis 0.1 and less.
 const LEAST_SHARE: f64 = 0.3;
 
-/// What is odd about the bodies of a robot, in sentences.
+/// Returns the implausible properties of a robot's bodies as sentences.
 pub fn oddities(model: &Model) -> Vec<String> {
     let moving = model.links().iter();
     let moving: Vec<&Link> = moving
@@ -28,8 +28,8 @@ pub fn oddities(model: &Model) -> Vec<String> {
         && (moving.iter()).all(|link| (link.mass_kg() / first.mass_kg() - 1.0).abs() < ALIKE)
     {
         odd.push(format!(
-            "In the URDF all {} moving links have the same mass, {} kg: placeholders that nobody has measured. What acts like a \
-             weight here, a body, a spring or a gain, may be their error. Enter the masses of the robot's maker, then explain again.",
+            "In the URDF all {} moving links have the same mass, {} kg, so these are probably placeholders. A finding that acts like a \
+             weight (a body, a spring or a gain) may be their error. Enter the manufacturer's masses, then explain again.",
             moving.len(),
             number(first.mass_kg())
         ));
@@ -40,22 +40,23 @@ pub fn oddities(model: &Model) -> Vec<String> {
         .collect();
     if about_frame.len() >= LEAST_ALIKE && 2 * about_frame.len() > moving.len() {
         odd.push(format!(
-            "In the URDF the inertias of {} are those of bodies about the link's frame. A URDF has them about the centre of mass. \
-             What acts like a body here may be that error. Correct the inertias, then explain again.",
+            "In the URDF the inertias of {} are given about the link's frame instead of the centre of mass. \
+             A finding that acts like a body may be this error. Correct the inertias, then explain again.",
             about_frame.join(", ")
         ));
     }
     odd
 }
 
-/// Whether such bodies imitate an effect: all that acts like a weight, or as a share of one.
+/// Whether errors of such bodies imitate an effect: one that acts like a weight or is proportional to one.
 pub fn imitates(effect: &Effect) -> bool {
     let of_family = matches!(effect.family, Family::Body | Family::Spring);
     (of_family && !effect.traits.describes_only) || effect.traits.is_scale
 }
 
-/// Whether the inertia that is given as that about the centre of mass is one about the link's frame: less what the distance
-/// adds (Steiner), it is still that of a body. Of a body's own inertia too little would be left.
+/// Whether the inertia declared about the centre of mass is one about the link's frame: after subtraction of the
+/// contribution of the distance (Steiner), it is still that of a body. For an inertia about the centre, too little
+/// would remain.
 fn is_about_frame(link: &Link) -> bool {
     let [x, y, z] = link.com_m();
     let [xx, xy, xz, yy, yz, zz] = link.inertia.inertia_about_com_kgm2();
@@ -75,7 +76,8 @@ fn is_about_frame(link: &Link) -> bool {
 mod tests {
     use super::*;
 
-    /// Four links in a row, rods of these masses; the inertia of each is about its middle, or about its frame at one end.
+    /// Builds four links in a row, rods of these masses; the inertia of each is about its middle, or about its frame
+    /// at one end.
     fn robot(masses_kg: [f64; 4], about_frame: bool) -> Model {
         let mut urdf = String::from("<robot name=\"rods\"><link name=\"link0\"/>");
         for (k, mass) in masses_kg.iter().enumerate() {

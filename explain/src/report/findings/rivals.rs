@@ -1,4 +1,4 @@
-//! What is kept of a finding's rivals: why they were rejected, and the motion that would separate those that tie.
+//! Alternatives of a finding: the reasons for rejection, and the motion that would distinguish equally likely ones.
 
 use super::{Named, place_of, rival};
 use crate::inference::{AS_LIKELY, Alternative};
@@ -8,8 +8,8 @@ use crate::report::schema::{NextMotion, Rejected, Rival};
 use crate::report::{next_motion, sentences};
 
 impl Named {
-    /// Keeps the rivals of a finding that are less likely, and the motion that would separate those that are as likely. Returns
-    /// the latter. `margin` is what the explanation loses without the finding \[nats\].
+    /// Records the less likely alternatives of a finding, and the motion that would distinguish the equally likely
+    /// ones. Returns the latter. `margin` is the loss of evidence without the finding \[nats\].
     pub(super) fn keep_rivals(
         &mut self,
         active: &Active,
@@ -20,7 +20,7 @@ impl Named {
     ) -> Vec<Rival> {
         let (ties, less_likely): (Vec<Alternative>, Vec<Alternative>) =
             others.iter().partition(|other| other.behind < AS_LIKELY);
-        // A rival that explains nothing is none.
+        // An alternative that explains nothing is not listed.
         for other in less_likely.iter().filter(|other| other.behind <= margin) {
             let (joint, link) = place_of(input, joints, &other.hypothesis);
             self.rejected.push(Rejected {
@@ -42,7 +42,8 @@ impl Named {
         ties.iter().map(|tie| rival(input, joints, tie)).collect()
     }
 
-    /// Keeps a motion to record next, unless the same motion separates the rivals of another finding already.
+    /// Records a motion to record next, unless the same motion already distinguishes the alternatives of another
+    /// finding.
     fn keep_motion(&mut self, mut next: NextMotion, trajectory: String) {
         let mut known = self.next_motions.iter_mut();
         if let Some(known) = known.find(|known| known.sentence == next.sentence) {

@@ -1,8 +1,9 @@
-//! How much of the mismatch a finding explains.
+//! Share of the mismatch that a finding explains, and its RMS effort.
 
 use crate::fit::fitted::Fit;
 
-/// Squares of the residual of `without` that `with` explains, over the final variance of each joint.
+/// Returns the mean square by which `with` reduces the residual of `without`, summed over joints in units of their
+/// final variance.
 pub fn mismatch(without: &Fit, with: &Fit, count: &Fit) -> f64 {
     (0..with.variance.len())
         .map(|j| {
@@ -14,8 +15,8 @@ pub fn mismatch(without: &Fit, with: &Fit, count: &Fit) -> f64 {
         .max(1e-12)
 }
 
-/// What `without` leaves less what `with` leaves, as root mean square at the joint where that is most \[effort unit\].
-/// `unit_nm` are N m per that unit, by joint.
+/// Returns the RMS by which `with` reduces the residual of `without`, at the joint with the largest reduction
+/// \[effort unit\]. `unit_nm` are N m per effort unit, by joint.
 pub fn effort_rms(without: &Fit, with: &Fit, unit_nm: &[f64]) -> f64 {
     let at = |j: usize| {
         let square = (without.squares[j] - with.squares[j]).max(0.0) / with.count[j].max(1.0);

@@ -1,4 +1,4 @@
-//! A cell's page: what it says, its joints beside its peers and over weeks, its contacts, incidents and notes.
+//! A cell's page: its status, its joints compared with its peers and over weeks, its contacts, incidents and notes.
 
 mod joints;
 
@@ -16,10 +16,10 @@ use crate::words;
 const DAYS: i64 = 42;
 const DAY_NS: i64 = 86_400_000_000_000;
 const MOST: u32 = 50;
-/// What of the archive belongs to a contact, before and behind it \[ns\]. Resolution: the motion that led there.
+/// Margin of the archive before and after a contact \[ns\]. Resolution: the motion that led there.
 const AROUND_NS: i64 = 5_000_000_000;
 
-/// What is kept of a cell; empty where nothing is.
+/// Stored data of a cell; empty without a store.
 #[derive(Debug, Default)]
 pub struct Kept {
     days: Vec<Day>,
@@ -30,12 +30,12 @@ pub struct Kept {
     notes: Vec<Note>,
     labels: Vec<KeptLabel>,
     physics: Option<CellPhysics>,
-    /// Why something is missing.
+    /// Reason why something is missing.
     trouble: Option<String>,
 }
 
 impl Kept {
-    /// Reads it.
+    /// Reads the stored data of a cell.
     pub fn read(hub: &Hub, cell: &str, now_ns: i64) -> Self {
         let read = hub.kept(|store| {
             Ok(Self {
@@ -134,7 +134,7 @@ fn actions(viewer: &Viewer, view: &CellView) -> Markup {
             form method="post" action=(to("acknowledge")) {
                 (secret)
                 button.main type="submit" { "Acknowledge" }
-                @if view.status.is_none() { p.muted { "Only noted here: the cell has told nothing yet." } }
+                @if view.status.is_none() { p.muted { "Only noted here: the cell has not sent a status yet." } }
                 @else if !takes { p.muted { "Only noted here: the cell takes no commands." } }
             }
             @if takes {

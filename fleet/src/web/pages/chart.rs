@@ -8,7 +8,7 @@ use crate::words;
 
 const DAY_NS: i64 = 86_400_000_000_000;
 
-/// A small curve over equal steps, with its range in words for who cannot see it.
+/// A small curve over equal steps, with its range in words for readers who cannot see it.
 pub fn spark(what: &str, values: &[f64], span: &str) -> Markup {
     let (width, height) = (120.0, 24.0);
     let (low, high) = range(values.iter().copied());
@@ -40,8 +40,8 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     (low, low + apart)
 }
 
-/// A joint's residual by day: the root mean square as a line, its quietest and loudest hour as a band, its normal as a
-/// dashed line, notes as marks.
+/// A joint's residual by day: the root mean square as a line, the quietest and loudest hour as a band, the normal
+/// residual as a dashed line, notes as marks.
 pub fn days(days: &[&Day], normal: Option<f64>, notes: &[Note], now_ns: i64, unit: &str) -> Markup {
     let (width, height, left, foot) = (420.0, 120.0, 46.0, 18.0);
     let Some(first) = days.first() else {
@@ -103,7 +103,7 @@ pub fn days(days: &[&Day], normal: Option<f64>, notes: &[Note], now_ns: i64, uni
     }
 }
 
-/// A number night by night with its intervals, its first level as a dashed line, the temperature below, notes as marks.
+/// A number by night with its intervals, its first level as a dashed line, the temperature below, notes as marks.
 pub fn nights(name: &str, nights: &[&Estimate], first: f64, notes: &[(f64, &Note)]) -> Markup {
     let (width, left, top, foot) = (420.0, 52.0, 6.0, 104.0);
     let (Some(oldest), Some(newest)) = (nights.first(), nights.last()) else {

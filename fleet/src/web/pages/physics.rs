@@ -1,4 +1,4 @@
-//! The physics of an arm over weeks: findings, and each number with its interval beside the temperature.
+//! The physics of an arm over weeks: findings, and each number with its interval and the temperature.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use tauscope_condition::{Finding, Quantity};
@@ -13,7 +13,7 @@ const NS_A_DAY: f64 = 86_400e9;
 const DAYS: f64 = 182.0;
 const DAYS_OF_A_WEEK: f64 = 7.0;
 
-/// The section of the cell's page; `None` where nothing is followed.
+/// Returns the section of the cell's page. `physics`: `None` without nightly tables.
 pub fn section(physics: Option<&CellPhysics>, notes: &[Note], now_ns: i64) -> Markup {
     let Some(physics) = physics else {
         return html! { p.muted {
@@ -36,7 +36,7 @@ pub fn section(physics: Option<&CellPhysics>, notes: &[Note], now_ns: i64) -> Ma
     }
 }
 
-/// The page of a week: what was found, what is new, and where each number stands. It stands alone.
+/// Returns the self-contained page of a week: all findings, the new ones, and the level of each number.
 pub fn week(physics: &CellPhysics, notes: &[Note], now_ns: i64, style: Option<&str>) -> Markup {
     let content = week_content(physics, notes, now_ns);
     html! {
@@ -90,11 +90,11 @@ fn week_content(physics: &CellPhysics, notes: &[Note], now_ns: i64) -> Markup {
         @let of_week: Vec<&Note> = of_week.collect();
         @if of_week.is_empty() { p.muted { "none" } }
         ul.notes { @for note in of_week { li { (words::time(note.at_ns)) ", " (note.by) ": " (note.text) } } }
-        p.muted { "Made " (words::time(now_ns)) ". Of a hundred arms in which nothing changes, one is told of in about ten years." }
+        p.muted { "Made " (words::time(now_ns)) ". A hundred arms that do not change cause about one false finding in ten years." }
     }
 }
 
-/// How old the newest night is.
+/// Describes the age of the newest night.
 fn age(physics: &CellPhysics, now_ns: i64) -> String {
     match physics.age_d(now_ns) {
         0 => "less than a day ago".to_owned(),
@@ -103,7 +103,7 @@ fn age(physics: &CellPhysics, now_ns: i64) -> String {
     }
 }
 
-/// That the numbers are of long ago, if they are.
+/// Returns the warning that the numbers are stale, if they are.
 fn stale(physics: &CellPhysics, now_ns: i64) -> Markup {
     html! { @if physics.stale_d(now_ns).is_some() {
         p.refused role="alert" {
@@ -160,7 +160,7 @@ fn table(physics: &CellPhysics) -> Markup {
     }
 }
 
-/// The change since the baseline, of what has a level as a share.
+/// Describes the change since the baseline, relative if the number has a level.
 fn change(one: &Followed) -> String {
     match one.series.quantity {
         Quantity::Coulomb | Quantity::Viscous | Quantity::Gain if one.first > 0.0 => {
@@ -170,7 +170,7 @@ fn change(one: &Followed) -> String {
     }
 }
 
-/// The curves, those of which something is found first.
+/// Returns the curves, those with findings first.
 fn curves(physics: &CellPhysics, notes: &[Note]) -> Markup {
     let (found, others): (Vec<&Followed>, Vec<&Followed>) = physics
         .followed

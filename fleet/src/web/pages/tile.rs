@@ -7,7 +7,7 @@ use super::chart;
 use crate::wall::{CellView, Severity, State};
 use crate::words;
 
-/// A cell's tile. It says of each value how old it is, and of a cell that is not there that all is old.
+/// Returns a cell's tile, with the age of each value. The tile of a stale, unknown or ended cell is marked as old.
 pub fn tile(view: &CellView, now_ns: i64) -> Markup {
     let status = view.status.as_ref();
     let is_old = matches!(
@@ -23,7 +23,7 @@ pub fn tile(view: &CellView, now_ns: i64) -> Markup {
             p.reason { (reason(view, now_ns)) }
             @if let Some(since_ns) = view.latched_behind() { p.reason {
                 "Its alarm was latched " (stamp(since_ns, &words::age_at(since_ns, now_ns)))
-                " ago; nobody has told that it is released."
+                " ago; its release has not been reported."
             } }
             @if let Some(until_ns) = view.muted_behind(now_ns) { p.reason {
                 "Muted until " (stamp(until_ns, &words::time_of_day(until_ns))) ": until then a new contact stops nothing."
@@ -52,7 +52,7 @@ pub fn name(severity: Severity) -> &'static str {
     }
 }
 
-/// Each severity has a shape of its own, for who does not see its colour.
+/// Returns the shape of a severity; each has its own, for readers who do not see its colour.
 fn icon(severity: Severity) -> Markup {
     let path = match severity {
         Severity::Critical => "M5 1h6l4 4v6l-4 4H5l-4-4V5z",
@@ -63,7 +63,7 @@ fn icon(severity: Severity) -> Markup {
     html! { svg.icon viewBox="0 0 16 16" aria-hidden="true" { path d=(path) {} } }
 }
 
-/// Since when, why, and until when.
+/// Describes the start, the reason and the end of a state.
 pub fn reason(view: &CellView, now_ns: i64) -> Markup {
     let reason = view.state.reason();
     html! {
@@ -80,12 +80,12 @@ pub fn reason(view: &CellView, now_ns: i64) -> Markup {
     }
 }
 
-/// A time, with the whole of it for machines and for who points at it.
+/// Returns a time as shown, with the full time as attribute and tooltip.
 pub fn stamp(ns: i64, shown: &str) -> Markup {
     html! { time datetime=(words::iso(ns)) title=(words::time(ns)) { (shown) } }
 }
 
-/// A joint's residual that is so many times its normal is shown in a warning's colour.
+/// Ratio of a joint's residual to its normal residual from which it is shown in the colour of a warning.
 /// Resolution: what a person of a hundred cells should look at; nothing is decided by it.
 const UNUSUAL: f64 = 2.0;
 
@@ -142,7 +142,7 @@ fn last_sample(view: &CellView, status: &StatusMessage) -> Markup {
     }
 }
 
-/// What, when and by whom it was acknowledged.
+/// Describes the last contact: its kind, its age, and who acknowledged it.
 pub fn last_contact(contact: Option<&ContactMessage>, now_ns: i64) -> Markup {
     let Some(contact) = contact else {
         return html! { "none" };
@@ -201,7 +201,7 @@ mod tests {
         let (cell, status) = ("a".to_owned(), Box::new(status));
         wall.take(Event::Status { cell, status }, Now::default());
         let shown = tile(&wall.snapshot().cells[0], 0).into_string();
-        // What is muted is not shown there.
+        // Muted text is not shown on a small tile.
         assert!(
             shown.contains("<dd class=\"brief\">no normal yet</dd>"),
             "{shown}"

@@ -1,4 +1,4 @@
-//! A detector: whether it can be made, behind its twin and with what it has learnt before.
+//! Check of a detector behind its twin, with its learnt state.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::settings::Settings;
 use crate::yaml::Place;
 
 impl Resolver<'_> {
-    /// Checks a detector by making it, and finds the file that keeps what it learns.
+    /// Checks a detector by building it, and resolves the path of its learnt state.
     pub(super) fn detect(
         &mut self,
         index: usize,
@@ -21,7 +21,7 @@ impl Resolver<'_> {
         let model = twin.and_then(|twin| self.models.get(&twin));
         let twin_config = twin.and_then(|twin| self.entry(twin).twin.as_ref());
         if twin_config.is_some_and(|twin| twin.model.is_some()) && model.is_none() {
-            // The twin's model is wrong, which has been said.
+            // The twin's model is invalid, which is already reported.
             return None;
         }
         let mut config = config.clone();

@@ -1,4 +1,4 @@
-//! Whether a twin's model was made for what it is used for.
+//! Check that a twin's model was made for this robot and these filters.
 
 use tauscope_twin::TwinFile;
 
@@ -7,8 +7,8 @@ use crate::cell::Cell;
 use crate::yaml::Place;
 
 impl Resolver<'_> {
-    /// A model holds for the robot and the filters it was made with: behind others, its noise and the
-    /// thresholds that rest on its scores mean nothing.
+    /// Checks that the model was made for this robot and with these filters. Behind others its noise, and the
+    /// thresholds based on its scores, are invalid.
     pub(super) fn model_fits(
         &mut self,
         place: &Place,

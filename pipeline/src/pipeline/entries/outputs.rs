@@ -1,4 +1,4 @@
-//! What recorders write must be apart from each other and from what sources read.
+//! Check that recorders write to distinct files, and not to files that sources read.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,8 +8,8 @@ use crate::pipeline::file::stage_place;
 use crate::yaml::Place;
 
 impl Resolver<'_> {
-    /// Two recorders on one file would spoil each other's, and one that writes what a source reads
-    /// would spoil that.
+    /// Checks that no two recorders write to the same file, and that none writes to a file that a source reads:
+    /// either would corrupt the file.
     pub(super) fn outputs_apart(&mut self) {
         let mut taken: BTreeMap<(Option<&str>, PathBuf), (Place, String)> = BTreeMap::new();
         for index in 0..self.file.value.stages.len() {
@@ -51,7 +51,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// The path without `.` and `..`, as far as can be said without the files being there.
+    /// The absolute path without `.` and `..`, resolved without access to the file system.
     fn plain(&self, path: &Path) -> PathBuf {
         let path = std::path::absolute(self.file.resolve(path)).unwrap_or_else(|_| path.to_owned());
         path.components().fold(PathBuf::new(), |mut plain, part| {

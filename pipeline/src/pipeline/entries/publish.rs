@@ -1,4 +1,4 @@
-//! A publisher must serve one cell, and know where the cell's source takes commands.
+//! Check of a publisher: it serves one cell and listens to the source to which it sends commands.
 
 use std::path::PathBuf;
 
@@ -87,7 +87,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Where the source of the stage's cell takes commands.
+    /// Command endpoints of the source of the stage's cell.
     fn commands(&self, index: usize) -> Option<ZenohEndpoints> {
         let wiring = self.wiring?;
         let cells = &wiring.cells[index];

@@ -1,4 +1,4 @@
-//! What a recorder is told: where its files go, and that they can.
+//! Check of a recorder: its file names are valid and its folders are writable.
 
 use std::path::Path;
 
@@ -39,7 +39,7 @@ impl Resolver<'_> {
         Some(Settings::Record(config))
     }
 
-    /// Looks whether the names that a recorder is given are those of files.
+    /// Checks that the recorder's names are those of files, not of folders.
     fn are_files(
         &mut self,
         index: usize,
@@ -62,7 +62,7 @@ impl Resolver<'_> {
         None
     }
 
-    /// Looks whether the folders that a recorder writes to take files of this user.
+    /// Checks that this user may write to the recorder's folders.
     fn can_be_written(
         &mut self,
         index: usize,

@@ -1,4 +1,4 @@
-//! Whether all that is to be connected to or listened on is an endpoint.
+//! Check of the syntax of all network endpoints.
 
 use tauscope_bus::link::zenoh::check_endpoint;
 

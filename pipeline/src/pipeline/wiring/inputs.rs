@@ -1,4 +1,4 @@
-//! What each stage listens to: how many, whom, and whether it can take what they put out.
+//! Check of each stage's inputs: their number, their names, and their sample types.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::suggest;
 use crate::yaml::Place;
 
 impl<'a> Checker<'a> {
-    /// The first stage of each name.
+    /// Index of the first stage of each name.
     pub(super) fn stages_by_name(&self) -> BTreeMap<&'a str, usize> {
         let mut by_name = BTreeMap::new();
         for (index, stage) in self.stages.iter().enumerate() {
@@ -79,7 +79,7 @@ impl<'a> Checker<'a> {
         }
         let problem = match (role.takes(), named) {
             (Takes::Nothing, [(_, first), ..]) => {
-                let title = format!("an `{key}` stage is a source and listens to nobody");
+                let title = format!("an `{key}` stage is a source and takes no input");
                 self.file.at(first, title)
             }
             (Takes::One(kind), []) => {
@@ -115,7 +115,7 @@ impl<'a> Checker<'a> {
                 };
                 let name = &self.stages[input.stage].name;
                 let Some(given) = maker.gives() else {
-                    let title = format!("`{name}` puts out nothing that one could listen to");
+                    let title = format!("`{name}` has no output stream to listen to");
                     self.wrong(self.file.at(&input.place, title));
                     continue;
                 };

@@ -1,4 +1,4 @@
-//! In which order the stages stand, and which cell each one is in.
+//! Topological order of the stages, and the cells of each one.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use crate::suggest;
 use crate::yaml::Place;
 
 impl Checker<'_> {
-    /// Stages after all they listen to, in the file's order where that leaves a choice.
+    /// Sorts the stages topologically; ties keep the order of the file.
     pub(super) fn order(&mut self, inputs: &[Vec<Input>]) -> Option<Vec<usize>> {
         let mut order = Vec::new();
         let mut placed = vec![false; inputs.len()];
@@ -22,7 +22,7 @@ impl Checker<'_> {
         if order.len() == inputs.len() {
             return Some(order);
         }
-        // Every stage left listens to one that is left: following those ends in a cycle.
+        // Every unplaced stage has an unplaced input, so following the inputs leads to a cycle.
         let mut trail: Vec<(usize, &Place)> = Vec::new();
         let mut at = placed.iter().position(|done| !done)?;
         while !trail.iter().any(|(seen, _)| *seen == at) {

@@ -1,4 +1,4 @@
-//! In which process each stage runs.
+//! Process of each stage.
 
 use std::collections::BTreeSet;
 
@@ -8,8 +8,8 @@ use crate::pipeline::role::Role;
 use crate::yaml::Place;
 
 impl Checker<'_> {
-    /// Names the process of each stage. What judges a cell is in one process, so that no alarm waits for another
-    /// process; a recorder or a publisher, which may wait for a disk or a network, has one of its own.
+    /// Assigns a process to each stage. By default the stages that judge a cell share one process, so that no alarm
+    /// waits for another process. A recorder or a publisher, which may wait for a disk or a network, has its own.
     pub(super) fn processes(
         &mut self,
         roles: &[Option<Role>],

@@ -73,7 +73,7 @@ fn each_event_is_the_same_or_has_appeared_vanished_or_moved() {
 fn another_detector_in_the_place_of_one_is_compared_with_it_and_not_with_the_rest() {
     let a = results(vec![event("kept", 1.0, "l"), event("old", 1.0, "l")]);
     let b = results(vec![event("new", 1.01, "l")]);
-    // `kept` is no stage of B and pools with `old`; one of them pairs.
+    // B has no stage `kept`, so the events of `kept` and `old` are pooled; one of them pairs.
     assert_eq!(changes(&compare(&a, &b, 0.1).unwrap()).len(), 1);
     let b = results(vec![event("kept", 9.0, "l"), event("new", 1.01, "l")]);
     let found = compare(&a, &b, 0.1).unwrap();

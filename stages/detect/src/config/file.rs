@@ -1,4 +1,4 @@
-//! How files hold a [`Config`] and what a detector has learnt while running.
+//! File formats of a [`Config`] and of the state that a detector learns while running.
 
 use std::sync::LazyLock;
 
@@ -11,7 +11,7 @@ use super::Config;
 use crate::detectors::{DETECTORS, Entry};
 use crate::frame::{AnySettings, State, Threshold};
 
-/// The keys beside the detectors'.
+/// The keys in addition to those of the detectors.
 const THRESHOLD: &str = "threshold";
 const HOLD_S: &str = "hold_s";
 
@@ -40,7 +40,7 @@ impl<'de> Deserialize<'de> for Config {
     }
 }
 
-/// Reads one key after the other.
+/// Visitor that reads the keys of a [`Config`].
 struct Keys;
 
 impl<'de> Visitor<'de> for Keys {
@@ -77,7 +77,7 @@ impl<'de> Visitor<'de> for Keys {
     }
 }
 
-/// The settings of a detector, or nothing.
+/// The settings of a detector, or null.
 struct Optional(&'static Entry);
 
 impl<'de> DeserializeSeed<'de> for Optional {
@@ -110,14 +110,14 @@ impl<'de> Visitor<'de> for Optional {
     }
 }
 
-/// A detector: exactly one of the detectors' keys, and what all of them share.
+/// A detector: exactly one of the detectors' keys, and the settings that all detectors share.
 #[derive(Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Config")]
 struct Shared {
-    /// When the alarm is raised.
+    /// Alarm threshold.
     threshold: Threshold,
-    /// An alarm ends once the score has stayed below the threshold for this long \[s\].
+    /// Time for which the score must stay below the threshold before an alarm ends \[s\].
     #[schemars(range(min = 0.0, max = 3600.0))]
     hold_s: f64,
 }
@@ -159,8 +159,8 @@ impl JsonSchema for Config {
     }
 }
 
-/// What a detector has learnt while running, as its file holds it between two runs. Its schema is that of
-/// the detectors which learn.
+/// The state that a detector learns while running, kept in a file between runs. Its schema is that of the detectors
+/// that learn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct StateFile(pub State);

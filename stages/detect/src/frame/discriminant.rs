@@ -1,8 +1,8 @@
 //! Fisher's linear discriminant (R. A. Fisher, "The use of multiple measurements in taxonomic problems", 1936)
 //! between collisions and cooperations.
 //!
-//! The direction is `w = S⁻¹ (m_coll - m_coop)` with the scatter S within both kinds, and the bound lies half-way
-//! between the means.
+//! The direction is `w = S⁻¹ (m_coll - m_coop)` with the within-class scatter S; the bound is half-way between the
+//! means.
 
 use nalgebra::{Matrix6, Vector6};
 use schemars::JsonSchema;
@@ -10,33 +10,33 @@ use serde::{Deserialize, Serialize};
 
 use super::lesson::ContactKind;
 
-/// Added to the scatter, as a share of its trace: few contacts do not span all six directions.
+/// Ridge added to the scatter, relative to its trace: few contacts do not span all six directions.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const RIDGE: f64 = 1e-3;
 
-/// A direction and a bound.
+/// A linear discriminant: a direction and a bound.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Discriminant {
     /// Weights of the unit vectors' components: force x, y, z, velocity x, y, z.
     pub weights: [f64; 6],
-    /// A contact whose weighted sum is above this is a collision.
+    /// Weighted sum above which a contact is a collision.
     pub bound: f64,
 }
 
-/// What Fisher's discriminant is made from, for collisions and cooperations.
+/// Sufficient statistics of Fisher's discriminant, for collisions and cooperations.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Moments {
-    /// How many there are of each kind.
+    /// Number of contacts of each kind.
     pub counts: [f64; 2],
     /// Means of the measurements.
     pub means: [Vector6<f64>; 2],
-    /// Scatter within both kinds.
+    /// Within-class scatter.
     pub scatter: Matrix6<f64>,
 }
 
 impl Moments {
-    /// Of measured contacts.
+    /// Computes the moments of measured contacts.
     pub fn of(found: &[(ContactKind, Vector6<f64>)]) -> Self {
         let mut moments = Self {
             counts: [0.0; 2],
@@ -56,7 +56,7 @@ impl Moments {
         moments
     }
 
-    /// Together with others, whose means are taken for the same and whose scatter is added.
+    /// Pools two sets of moments: scatters are added, as if the means of a kind were equal in both sets.
     pub fn and(&self, other: &Self) -> Self {
         let both = |k: usize| {
             let (own, others) = (self.counts[k], other.counts[k]);
@@ -70,10 +70,10 @@ impl Moments {
         }
     }
 
-    /// The direction that parts the kinds best, and the bound half-way between their means.
+    /// Returns the direction that separates the kinds best, and the bound half-way between their means.
     pub fn discriminant(&self) -> Discriminant {
         let [collision, cooperation] = self.means;
-        // Both kinds without any scatter: then any direction in which they differ will do.
+        // Without any scatter, every direction in which the kinds differ separates them.
         let ridge = (RIDGE * self.scatter.trace()).max(f64::EPSILON);
         let scatter = self.scatter + Matrix6::identity() * ridge;
         let apart = collision - cooperation;

@@ -1,13 +1,13 @@
-//! From scores to events: the beginning and the end of an alarm.
+//! Events from scores: the start and the end of an alarm.
 
-/// What happens at a sample.
+/// State of the alarm at a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Step {
     /// No alarm.
     Free,
-    /// The alarm is raised at this sample; the contact is taken to have begun at `contact_ns`.
+    /// The alarm is raised at this sample; the estimated start of the contact is `contact_ns`.
     Onset { contact_ns: i64 },
-    /// The alarm goes on.
+    /// The alarm persists.
     Contact { contact_ns: i64 },
     /// The alarm ends at this sample.
     Offset,
@@ -17,10 +17,10 @@ pub(crate) enum Step {
 #[derive(Debug)]
 pub(crate) struct Alarm {
     threshold: f64,
-    /// A score from here on may already belong to a contact: where the search for its beginning stops.
+    /// Score from which a sample may already belong to a contact: the search for the contact's start stops below it.
     low: f64,
     hold_ns: i64,
-    /// Beginning of the contact, while an alarm lasts.
+    /// Start of the contact, while an alarm lasts.
     contact_ns: Option<i64>,
     /// Newest sample below `low`, and newest at or above the threshold.
     newest_low_ns: Option<i64>,
@@ -28,7 +28,7 @@ pub(crate) struct Alarm {
 }
 
 impl Alarm {
-    /// An alarm at `threshold`; the beginning of a contact is where the score last left `low`.
+    /// Creates an alarm at `threshold`; a contact starts where the score last rose above `low`.
     pub fn new(threshold: f64, low: f64, hold_s: f64) -> Self {
         Self {
             threshold,
@@ -44,8 +44,8 @@ impl Alarm {
         self.threshold
     }
 
-    /// Takes the score of the sample at `stamp_ns`; `None` where the detector is not ready, which
-    /// ends an alarm and forgets what was before.
+    /// Processes the score of the sample at `stamp_ns`. `None` (detector not ready) ends an alarm and discards the
+    /// history.
     pub fn step(&mut self, stamp_ns: i64, score: Option<f64>) -> Step {
         let Some(score) = score else {
             self.newest_low_ns = None;
@@ -55,7 +55,7 @@ impl Alarm {
                 Step::Free
             };
         };
-        // Equation 7: True where the score is equal, too.
+        // Equation 7: a score equal to the threshold raises the alarm, too.
         let high = score >= self.threshold;
         if high {
             self.newest_high_ns = stamp_ns;
@@ -78,22 +78,22 @@ impl Alarm {
         if score < self.low {
             self.newest_low_ns = Some(stamp_ns);
         } else if self.newest_low_ns.is_none() {
-            // Never low since it became ready: the earliest a contact can be known to have begun.
+            // Never low since the detector became ready: the earliest known start of a contact.
             self.newest_low_ns = Some(stamp_ns);
         }
         step
     }
 }
 
-/// The events of a detector with rules of its own: one is as long as its kind and its beginning stay.
+/// The events of a detector with its own rules: an event lasts while its kind and its start are unchanged.
 #[derive(Debug, Default)]
 pub(crate) struct OwnEvents {
-    /// Kind and beginning, while one lasts.
+    /// Kind and start of the current event.
     open: Option<(&'static str, i64)>,
 }
 
 impl OwnEvents {
-    /// Takes what the detector says of the next sample: its state, and where the contact began.
+    /// Processes the detector's result for the next sample: its state, and the start of the contact.
     pub fn step(&mut self, state: Option<&'static str>, contact_ns: Option<i64>) -> Step {
         let now = state.zip(contact_ns);
         let before = std::mem::replace(&mut self.open, now);

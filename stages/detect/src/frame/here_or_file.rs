@@ -1,4 +1,4 @@
-//! A value of the pipeline file that may stand in a file of its own.
+//! A value of the pipeline file that may be kept in a file of its own.
 
 use std::borrow::Cow;
 use std::marker::PhantomData;
@@ -13,12 +13,12 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 pub enum HereOrFile<T> {
     /// The value itself.
     Here(T),
-    /// A file that whoever reads the pipeline file replaces by its content.
+    /// Path of a file, which the reader of the pipeline file replaces by its content.
     File(PathBuf),
 }
 
 impl<T> HereOrFile<T> {
-    /// The value, unless it is still in its file.
+    /// Returns the value, unless it is still in its file.
     pub fn here(&self) -> Option<&T> {
         match self {
             Self::Here(value) => Some(value),
@@ -26,7 +26,7 @@ impl<T> HereOrFile<T> {
         }
     }
 
-    /// As [`here`](Self::here), to be changed.
+    /// Returns a mutable reference to the value, unless it is still in its file.
     pub fn here_mut(&mut self) -> Option<&mut T> {
         match self {
             Self::Here(value) => Some(value),
@@ -34,7 +34,7 @@ impl<T> HereOrFile<T> {
         }
     }
 
-    /// The file, while it has not been read.
+    /// Returns the file, while it has not been read.
     pub fn file(&self) -> Option<&Path> {
         match self {
             Self::Here(_) => None,
@@ -58,7 +58,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for HereOrFile<T> {
     }
 }
 
-/// A text is a path, a mapping is the value: so an error within the value says where it is.
+/// Visitor that reads a string as a path and a mapping as the value, so that an error in the value has its location.
 struct Either<T>(PhantomData<T>);
 
 impl<'de, T: Deserialize<'de>> Visitor<'de> for Either<T> {
@@ -87,8 +87,8 @@ impl<T: JsonSchema> JsonSchema for HereOrFile<T> {
     }
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        // The keywords for mappings say nothing of a text, so no choice between two schemas is needed, of which a
-        // mismatch could only say that neither fits.
+        // Keywords for mappings do not apply to strings, so no `anyOf` of two schemas is needed. Its error messages
+        // could only state that neither schema fits.
         let mut schema = T::json_schema(generator);
         schema.insert("type".to_owned(), serde_json::json!(["object", "string"]));
         schema

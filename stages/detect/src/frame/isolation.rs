@@ -1,10 +1,10 @@
-//! Which link was touched, and how hard, for detectors that give only a score.
+//! Isolation of a contact: the touched link and the force, for detectors that give only a score.
 //!
 //! A force on link k loads only the joints between the base and k, by τ = Jᵀ F (Haddadin, De Luca and
 //! Albu-Schäffer, "Robot Collisions: A Survey on Detection, Isolation, and Identification", 2017,
-//! sections V and VI). For every link the force is sought that explains the residual of all joints
-//! best, the point of contact taken at the link's centre of mass. The link that leaves least
-//! unexplained over all samples of the contact is the touched one.
+//! sections V and VI). For every link, the force that best explains the residual of all joints is
+//! computed, with the contact point at the link's centre of mass. The touched link is the one that
+//! leaves the least residual unexplained over all samples of the contact.
 
 use nalgebra::{Matrix3, Vector3};
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
@@ -13,25 +13,25 @@ use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian, link_pos
 use super::loaded::LoadedJoints;
 use super::setup::Setup;
 
-/// Weight of a small force against a good fit, relative to the information the loaded joints give:
-/// keeps directions that no joint feels at zero instead of unbounded.
+/// Damping of the least-squares force, relative to the trace of its information matrix: directions that no
+/// joint senses stay at zero instead of unbounded.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const DAMPING: f64 = 1e-2;
 
-/// What is known of a contact.
+/// Location and force of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// The touched link, as an index into the model's links.
     pub link: usize,
-    /// Another that it may as well have been, where the residual does not part them.
+    /// An alternative link that the residual does not distinguish from the touched one, if there is one.
     pub other_link: Option<usize>,
     /// Force on the robot, world frame \[N\].
     pub force_n: [f64; 3],
-    /// Where it is taken to act, world frame \[m\].
+    /// Assumed point of application, world frame \[m\].
     pub point_m: [f64; 3],
 }
 
-/// Estimates contacts of one robot. No allocation per call.
+/// Locates contacts of one robot. No allocation per call.
 #[derive(Debug)]
 pub struct Isolation {
     /// Standard deviation of the contact-free residual by joint \[effort unit\]; infinite if unknown.
@@ -39,14 +39,14 @@ pub struct Isolation {
     /// Effort unit per N m by joint.
     effort_per_nm: Vec<f64>,
     model: Option<(Model, Data)>,
-    /// Of the present contact: the joints, and what a force on each link explains, summed over its samples, by the joint
-    /// that carries the link \[squared standard deviations\].
+    /// Loaded joints of the current contact, and the part of the residual that a force on each link explains, summed
+    /// over the contact's samples, by the joint that carries the link \[squared standard deviations\].
     loaded: LoadedJoints,
     explained: JointArray,
 }
 
 impl Isolation {
-    /// For the robot of `setup`; without a model only the loaded joints are told.
+    /// Creates the isolation for the robot of `setup`; without a model it determines only the loaded joints.
     pub fn new(setup: Setup) -> Self {
         Self {
             noise: setup
@@ -68,13 +68,13 @@ impl Isolation {
         }
     }
 
-    /// Begins another contact.
+    /// Starts a new contact.
     pub fn begin(&mut self) {
         self.loaded = LoadedJoints::default();
         self.explained = [0.0; MAX_JOINTS];
     }
 
-    /// The joints that the contact loads: bit j for joint j. The sample is added to the contact if `counts`.
+    /// Returns the joints that the contact loads: bit j for joint j. The sample is added to the contact if `counts`.
     pub fn loaded_joints(&mut self, sample: &TwinState, score: f64, counts: bool) -> u32 {
         if counts {
             let residuals = sample.residual.iter().zip(&self.noise);
@@ -83,14 +83,14 @@ impl Isolation {
         self.loaded.mask()
     }
 
-    /// The link that explains the contact best, with the force of this sample; nothing if no link explains any of it or
-    /// there is no model. The sample is added to the contact if `counts`.
+    /// Returns the link that explains the contact best, with the force of this sample; `None` without a model or if
+    /// no link explains any of the residual. The sample is added to the contact if `counts`.
     pub fn locate(&mut self, sample: &TwinState, counts: bool) -> Option<Contact> {
         let (model, data) = self.model.as_mut()?;
         let n = self.noise.len();
         forward_kinematics(model, data, &sample.position[..n]);
         let mut best: Option<(f64, Contact)> = None;
-        // No residual parts a link whose joint tells no torque from the one that carries it.
+        // A link whose joint has no known torque cannot be distinguished from its parent link.
         let told = |joint: &usize| self.effort_per_nm[*joint].is_finite();
         for joint in (0..n).filter(told) {
             let link = model.body_link(joint);
@@ -135,7 +135,7 @@ impl Isolation {
         best.map(|(_, contact)| contact)
     }
 
-    /// The name of a link.
+    /// Returns the name of a link.
     pub fn link_name(&self, link: usize) -> &str {
         self.model
             .as_ref()

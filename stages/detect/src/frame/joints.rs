@@ -1,8 +1,8 @@
-//! Whether what was learnt by joint belongs to the joints at hand.
+//! Checks that data learnt by joint belongs to the cell's joints.
 
 use std::collections::BTreeSet;
 
-/// A clause that says so if `found` and `joint_names` are not the same joints, in whatever order.
+/// Returns a clause that describes the mismatch if `found` and `joint_names` differ, regardless of their order.
 pub(crate) fn others<'a>(
     found: impl Iterator<Item = &'a String>,
     joint_names: &[String],
@@ -14,7 +14,7 @@ pub(crate) fn others<'a>(
     (!same).then(|| of(&found, joint_names))
 }
 
-/// A clause that says so if `found` are not `joint_names` in their order.
+/// Returns a clause that describes the mismatch if `found` and `joint_names` differ, including their order.
 pub(crate) fn in_other_order<'a>(
     found: impl Iterator<Item = &'a String>,
     joint_names: &[String],

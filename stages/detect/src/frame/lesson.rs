@@ -1,4 +1,4 @@
-//! What a detector learns from: recordings behind the twin, and what touched the robot in them.
+//! Training data of a detector: recordings processed by the twin, and the labelled contacts in them.
 
 use std::path::PathBuf;
 
@@ -9,44 +9,44 @@ use super::setup::Setup;
 /// The recordings that a detector learns from.
 #[derive(Debug, Clone, Copy)]
 pub struct Lessons<'a> {
-    /// Those it is trained or tuned on.
+    /// Recordings for training or tuning.
     pub train: &'a [Lesson],
-    /// Those that thresholds are chosen on, and training is stopped by.
+    /// Recordings for the choice of thresholds and for early stopping.
     pub validation: &'a [Lesson],
 }
 
-/// What there is to learn from, and in which cell.
+/// A training task: the cell and the data.
 #[derive(Debug, Clone, Copy)]
 pub struct Task<'a> {
     /// The cell and its twin.
     pub setup: &'a Setup,
-    /// Recordings behind the twin.
+    /// Recordings processed by the twin.
     pub lessons: Lessons<'a>,
-    /// For so long nothing touches the robot at the beginning of each recording \[s\].
+    /// Duration without contacts at the start of each recording \[s\].
     pub free_first_s: f64,
-    /// For what is drawn by chance.
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
-/// One recording behind the twin.
+/// One recording processed by the twin.
 #[derive(Debug, Clone, Default)]
 pub struct Lesson {
-    /// Its name, for errors.
+    /// Name, for error messages.
     pub name: String,
-    /// Every sample, in order.
+    /// All samples, in order.
     pub samples: Vec<TwinState>,
-    /// What touched the robot; empty if nothing did, `None` if nobody has said.
+    /// Labelled contacts; empty if there was none, `None` if the recording is not labelled.
     pub contacts: Option<Vec<LabelledContact>>,
 }
 
 impl Lesson {
-    /// Whether a labelled contact lasts at this instant \[ns since the epoch\].
+    /// Returns whether there is a labelled contact at this instant \[ns since the epoch\].
     pub fn touches(&self, stamp_ns: i64) -> bool {
         let mut contacts = self.contacts.iter().flatten();
         contacts.any(|contact| (contact.on_ns..=contact.off_ns).contains(&stamp_ns))
     }
 
-    /// Every sample, the first of them a new beginning.
+    /// Returns all samples; the first one has [`flags::RESET`].
     pub(crate) fn anew(&self) -> impl Iterator<Item = TwinState> {
         let mut begin = flags::RESET;
         self.samples.iter().map(move |sample| {
@@ -57,78 +57,78 @@ impl Lesson {
     }
 }
 
-/// A contact that somebody labelled.
+/// A labelled contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LabelledContact {
     /// First instant \[ns since the epoch\].
     pub on_ns: i64,
     /// Last instant \[ns since the epoch\].
     pub off_ns: i64,
-    /// What it was.
+    /// Kind of the contact.
     pub kind: ContactKind,
-    /// Too weak to be counted either way.
+    /// Whether it is too weak to be counted as detected or missed.
     pub ignore: bool,
 }
 
-/// What a contact was.
+/// Kind of a contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ContactKind {
-    /// Nobody has said which.
+    /// A contact of unspecified kind.
     Contact,
-    /// By accident.
+    /// An accidental contact.
     Collision,
-    /// By the will of somebody who leads the robot.
+    /// An intended contact of a person who guides the robot.
     Cooperation,
 }
 
-/// Why a detector cannot learn.
+/// Reason why a detector cannot learn.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LearnError {
-    /// Labels that its tuning needs are missing.
+    /// Missing labels that the tuning needs.
     #[error(
         "{detector} is tuned on labelled contacts, and {missing}: say in the set's `labels` what touched the robot and of which `kind` it was, collision or cooperation"
     )]
     NoLabels {
         /// The detector.
         detector: &'static str,
-        /// What is missing, as a clause.
+        /// The missing labels, as a clause.
         missing: String,
     },
-    /// Too little to learn from.
+    /// Too little training data.
     #[error("{detector} learns from at least {wanted}, and the recordings hold {found}")]
     TooLittle {
         /// The detector.
         detector: &'static str,
-        /// How much is wanted, e.g. `100 settled samples`.
+        /// Required amount, e.g. `100 settled samples`.
         wanted: String,
-        /// How much there is.
+        /// Available amount.
         found: String,
     },
-    /// A setting of the training is out of range.
+    /// A training setting out of range.
     #[error("{detector} cannot be trained so: {what}")]
     Setting {
         /// The detector.
         detector: &'static str,
-        /// What the setting must be.
+        /// Requirement on the setting.
         what: &'static str,
     },
-    /// What computes the training failed.
+    /// A failure of the training computation.
     #[error("{detector} could not be trained: {reason}")]
     Failed {
         /// The detector.
         detector: &'static str,
-        /// Why.
+        /// The cause.
         reason: String,
     },
-    /// What was trained cannot be written.
+    /// A trained detector that cannot be written.
     #[error("the trained detector {} cannot be written: {reason}", path.display())]
     NotKept {
-        /// Where it should have gone.
+        /// Path of the file.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         reason: String,
     },
-    /// The settings do not fit.
+    /// Settings that do not fit the cell.
     #[error(transparent)]
     Config(#[from] super::error::ConfigError),
 }

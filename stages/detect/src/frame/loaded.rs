@@ -6,10 +6,10 @@ use tauscope_bus::{JointArray, MAX_JOINTS};
 /// Statistical: Gaussian noise goes beyond four standard deviations once in 16 000 samples.
 const LOADED_SIGMAS: f64 = 4.0;
 
-/// A vote of the contact's samples on each joint, weighted by the score: a joint is loaded if it is so in the samples
-/// that make up more than half of the summed score. So a joint whose residual errs for a part of the contact, for
-/// example while it reverses, is not listed. This is a weighted median (breakdown point one half: Huber and Ronchetti,
-/// "Robust Statistics", 2009, section 3.1).
+/// A vote of the contact's samples on each joint, weighted by the score: a joint is loaded if it is loaded in samples
+/// that make up more than half of the summed score. So a joint whose residual is wrong during a part of the contact,
+/// for example while the joint reverses, is not listed. This is a weighted median (breakdown point one half: Huber
+/// and Ronchetti, "Robust Statistics", 2009, section 3.1).
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LoadedJoints {
     /// Summed score of the samples in which the joint is loaded, by joint.
@@ -19,7 +19,7 @@ pub(crate) struct LoadedJoints {
 }
 
 impl LoadedJoints {
-    /// Whether no sample of the contact was added yet.
+    /// Returns whether no sample has been added.
     pub fn is_empty(&self) -> bool {
         self.total <= 0.0
     }
@@ -35,8 +35,8 @@ impl LoadedJoints {
         }
     }
 
-    /// A joint's residual; where the joint is not loaded, no larger than its noise may be. So a few samples in which it
-    /// errs do not outweigh the rest of the contact (Huber's function, section 4.5 of the same book).
+    /// Returns a joint's residual, limited to the range of its noise if the joint is not loaded. So a few wrong
+    /// samples do not outweigh the rest of the contact (Huber's function, section 4.5 of the same book).
     pub fn limit(&self, joint: usize, residual: f64, noise: f64) -> f64 {
         if self.is_loaded(joint) {
             residual
@@ -50,7 +50,7 @@ impl LoadedJoints {
         2.0 * self.loaded[joint] > self.total
     }
 
-    /// The loaded joints: bit j for joint j.
+    /// Returns the loaded joints: bit j for joint j.
     pub fn mask(&self) -> u32 {
         (0..MAX_JOINTS)
             .filter(|&j| self.is_loaded(j))

@@ -6,19 +6,19 @@
 //! r = K (p - ∫ (τ - n + Ṁ q̇ + r) dt),   p = M(q) q̇,   r → τ_ext
 //! ```
 //!
-//! τ is the motors' measured effort, n what the twin says the motion costs beyond its inertia:
-//! `expected_effort - M(q) q̈` with the twin's own q̈. So whatever a corrected twin knows (friction, a
-//! payload, an offset) is in n, and the twin's delayed acceleration is not in the result: ṗ stands in
-//! its place. What a corrected twin changes about *inertia* stays with the twin's acceleration.
+//! τ is the motors' measured effort. n is the twin's effort without the inertial part:
+//! `expected_effort - M(q) q̈` with the twin's own q̈. So n contains every correction of the twin (friction, a
+//! payload, an offset), and ṗ replaces the twin's delayed acceleration in the result. Only a correction of
+//! *inertia* still uses the twin's acceleration.
 //!
 //! Differentiated, the observer is a low-pass, `ṙ = K (ṗ - Ṁ q̇ - τ + n - r)`. By the product rule
 //! `ṗ - Ṁ q̇` over a step is the mean mass matrix times the change of velocity; with the input constant
-//! over the step, the step is solved exactly, so that clocks may be uneven and no integral drifts.
-//! The mass matrix itself is not needed: it multiplies, at either end of the step, what the velocity has
-//! changed by a second less q̈.
+//! over the step, the step is solved exactly, so that samples may be unevenly spaced and no integral drifts.
+//! The mass matrix itself is not needed, only its product with the rate of change of the velocity less q̈,
+//! at either end of the step.
 //!
-//! Sign: the measured effort is the motors'. It exceeds the twin's by friction and the like less Jᵀ F,
-//! with F the force on the robot; at rest the result is minus the residual.
+//! Sign: the measured effort is the motors'. It exceeds the twin's effort by unmodelled friction and the like minus
+//! Jᵀ F, with F the force on the robot; at rest the result is minus the residual.
 
 pub(crate) mod gain;
 
@@ -30,7 +30,7 @@ use super::setup::{JointSetup, Setup};
 use super::shared::Tap;
 pub use gain::DEFAULT_GAIN_PER_S;
 
-/// The observer counts as settled after so many of its time constants: 1 % of a step is missing still.
+/// Settling time of the observer, in time constants, after which 1 % of a step remains.
 /// Statistical: ln 100.
 const SETTLED: f64 = 4.605_170_185_988_092;
 
@@ -39,12 +39,12 @@ const SETTLED: f64 = 4.605_170_185_988_092;
 pub struct MomentumObserver {
     gain_per_s: f64,
     inertia: Tap<Inertia>,
-    /// N m per effort unit by joint; 0 where that is not known.
+    /// N m per effort unit by joint; 0 where unknown.
     nm_per_effort: Vec<f64>,
-    /// Stamp of the sample before, and its τ less what the twin expects \[N m\].
+    /// Stamp of the previous sample, and its τ less the twin's expected effort \[N m\].
     before_ns: Option<i64>,
     excess: JointArray,
-    /// Step \[s\], and the share of a change that is followed in it; kept, for clocks are often even.
+    /// Step \[s\], and the low-pass coefficient for it; cached, because steps are often equal.
     step: (f64, f64),
     /// Estimate by joint \[N m\].
     torque_nm: JointArray,
@@ -52,10 +52,10 @@ pub struct MomentumObserver {
 }
 
 impl MomentumObserver {
-    /// An observer with the gain K \[1/s\] for the robot of `setup`; `detector` asks for it.
+    /// Creates an observer with the gain K \[1/s\] for the robot of `setup`; `detector` is named in errors.
     ///
     /// # Errors
-    /// If `setup` has no model, or no joint whose effort can be turned into a torque.
+    /// If `setup` has no model, or no joint whose effort can be converted to a torque.
     pub fn new(
         setup: &Setup,
         gain_per_s: f64,
@@ -87,14 +87,14 @@ impl MomentumObserver {
         })
     }
 
-    /// Takes the next sample and returns the external torque on the robot by joint \[N m, N\]. It is 0
-    /// at a joint whose effort cannot be turned into a torque ([`MomentumObserver::knows`]). After
-    /// [`flags::RESET`] it begins anew at 0; a repeated stamp changes nothing.
+    /// Processes the next sample and returns the external torque on the robot by joint \[N m, N\]. It is 0
+    /// at a joint whose effort cannot be converted to a torque ([`MomentumObserver::knows`]).
+    /// [`flags::RESET`] restarts it at 0; a repeated stamp changes nothing.
     pub fn update(&mut self, sample: &TwinState) -> &JointArray {
         self.update_beside(sample, &sample.expected_effort)
     }
 
-    /// As [`MomentumObserver::update`] beside another twin's `expected_effort`.
+    /// [`MomentumObserver::update`] with the `expected_effort` of another twin.
     pub fn update_beside(
         &mut self,
         sample: &TwinState,
@@ -125,7 +125,7 @@ impl MomentumObserver {
         &self.torque_nm
     }
 
-    /// Shows `work` the robot, and where its links are at the newest sample.
+    /// Calls `work` with the robot model and its link poses at the newest sample.
     pub(crate) fn with_robot<R>(&mut self, work: impl FnOnce(&Model, &Data) -> R) -> R {
         self.inertia.with(|inertia| {
             let (model, data) = inertia.robot();
@@ -133,17 +133,17 @@ impl MomentumObserver {
         })
     }
 
-    /// What the last update returned.
+    /// Returns the result of the last update.
     pub fn torque_nm(&self) -> &JointArray {
         &self.torque_nm
     }
 
-    /// Whether the effort of this joint can be turned into a torque.
+    /// Returns whether the effort of this joint can be converted to a torque.
     pub fn knows(&self, joint: usize) -> bool {
         (self.nm_per_effort.get(joint)).is_some_and(|&per_effort| per_effort != 0.0)
     }
 
-    /// Whether what was assumed at the start has been forgotten: all but 1 % of it.
+    /// Returns whether the initial transient has decayed to 1 %.
     pub fn settled(&self) -> bool {
         self.before_ns.is_some_and(|before_ns| {
             let since_s = (before_ns - self.started_ns) as f64 * 1e-9;
@@ -152,17 +152,17 @@ impl MomentumObserver {
     }
 }
 
-/// What the arm's motion costs in inertia beyond what the twin has taken it for. No allocation per sample.
+/// Inertial effort of the arm's motion beyond that of the twin's filtered acceleration. No allocation per sample.
 #[derive(Debug, Clone)]
 pub(crate) struct Inertia {
     model: Model,
     data: Data,
     effort: InertialEffort,
-    /// Stamp of the sample before, its velocity and the twin's acceleration.
+    /// Stamp of the previous sample, its velocity and the twin's acceleration.
     before_ns: Option<i64>,
     velocity: JointArray,
     acceleration: JointArray,
-    /// By joint \[N m\].
+    /// Mean inertial effort over the newest step, by joint \[N m\].
     mean_nm: JointArray,
 }
 
@@ -179,7 +179,7 @@ impl Inertia {
         }
     }
 
-    /// That of the robot of `setup`, shared where others of its detectors ask, too; nothing without a model.
+    /// Returns the inertia of the robot of `setup`, shared with its other detectors; `None` without a model.
     pub fn of(setup: &Setup) -> Option<Tap<Self>> {
         let model = setup.model.as_ref()?;
         let new = || Self::new(model.clone());
@@ -189,8 +189,8 @@ impl Inertia {
         })
     }
 
-    /// Mean over the step to the next sample of M times (the velocity's change a second - q̈), by joint
-    /// \[N m\]; 0 at the first. A repeated stamp changes nothing.
+    /// Returns the mean of M (Δq̇/Δt - q̈) over the step to this sample, by joint \[N m\]; 0 at the first sample. A
+    /// repeated stamp changes nothing.
     pub fn update(&mut self, sample: &TwinState) -> JointArray {
         let stamp_ns = sample.header.stamp_ns;
         let n = self.model.dof();
@@ -201,7 +201,7 @@ impl Inertia {
         self.effort.place(&sample.position[..n]);
         self.mean_nm = [0.0; MAX_JOINTS];
         if let Some(before_ns) = before_ns {
-            // Half of either end.
+            // Each end of the step has weight 1/2.
             let per_s = 0.5 / ((stamp_ns - before_ns) as f64 * 1e-9);
             let (mut newest, mut previous) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
             for j in 0..n {
@@ -218,7 +218,7 @@ impl Inertia {
         self.mean_nm
     }
 
-    /// The robot, and where its links are at the newest sample.
+    /// Returns the robot model and its link poses at the newest sample.
     fn robot(&mut self) -> (&Model, &Data) {
         self.effort.pose(&self.model, &mut self.data);
         (&self.model, &self.data)

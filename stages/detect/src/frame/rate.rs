@@ -1,33 +1,34 @@
-//! Whether a stream comes at the rate that something was learnt at.
+//! Checks whether a stream has the sample rate of the training data.
 
 use tauscope_bus::{TwinState, flags};
 
 use super::lesson::Lesson;
 use super::setup::Setup;
 
-/// Steps whose median is a stream's period.
+/// Number of steps whose median is a stream's period.
 /// Statistical: odd, so that the median is one of them, and enough that a few late ones do not move it.
 const COUNT: usize = 101;
-/// Fewer steps do, if they take longer than this many times what [`COUNT`] steps take at the rate of learning.
+/// Duration after which the median is taken from fewer steps, as a multiple of [`COUNT`] steps at the training rate.
 /// Statistical: a stream that slow has another rate, whatever its median.
 const PATIENCE: f64 = 3.0;
-/// Of so many steps at least the median is taken.
+/// Minimum number of steps for a median.
 /// Statistical: two late ones among them do not move it.
 const LEAST: usize = 5;
-/// So many medians in a row that are wrong from the first on: it is another stream, and no spell of a publisher.
+/// Number of wrong medians, without a right one before, after which the stream is faulty and not temporarily slow.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const NEVER: u32 = 5;
-/// Rates that differ by no more than this share are one.
+/// Relative difference up to which two rates are treated as equal.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SAME: f64 = 0.2;
-/// A rate that goes to and fro is told of once in so long \[ns\].
+/// Minimum interval between warnings about a fluctuating rate \[ns\].
 /// Resolution: what a person reads.
 const TOLD_EVERY_NS: i64 = 10_000_000_000;
 
-/// Holds the rate of a stream against the one that a detector was trained or tuned at: windows, recurrent
-/// nets and the noise of short means hold for no other. No allocation per sample.
+/// Compares the rate of a stream with the rate at which a detector was trained or tuned: windows, recurrent
+/// networks and the noise of short means are valid for no other rate. No allocation per sample.
 ///
-/// The rate is looked at all the time, for a publisher may have a slow spell. While it lasts the detector cannot judge.
+/// The rate is checked continuously, because a publisher may be slow for a while. During that time the detector
+/// cannot judge.
 #[derive(Debug, Clone)]
 pub(crate) struct Rate {
     /// The detector and its cell, for the warnings.
@@ -36,20 +37,20 @@ pub(crate) struct Rate {
     before_ns: Option<i64>,
     periods_ns: [i64; COUNT],
     count: usize,
-    /// What the periods add up to \[ns\].
+    /// Sum of the periods \[ns\].
     lasts_ns: i64,
     /// The newest median.
     found_hz: Option<f64>,
-    /// A median was right.
+    /// Whether any median was right.
     was_right: bool,
-    /// Medians that were wrong before one was right.
+    /// Number of wrong medians before the first right one.
     wrong: u32,
-    /// Stamp when a change was told of last \[ns\].
+    /// Stamp of the last warning \[ns\].
     told_ns: Option<i64>,
 }
 
 impl Rate {
-    /// For what the detector `name` of the cell in `setup` learnt at `learnt_hz`.
+    /// Creates the check for the detector `name` of the cell in `setup`, trained at `learnt_hz`.
     pub fn new(name: &str, setup: &Setup, learnt_hz: f64) -> Self {
         let cell = match setup.cell.as_str() {
             "" => String::new(),
@@ -69,8 +70,8 @@ impl Rate {
         }
     }
 
-    /// Takes the next sample. The median of its steps is known after some, and asked for anew after a
-    /// [`flags::RESET`]; repeated stamps are no steps.
+    /// Adds the next sample. A median needs several steps; [`flags::RESET`] discards those so far. A repeated stamp
+    /// is not a step.
     #[inline]
     pub fn update(&mut self, sample: &TwinState) {
         if sample.header.has(flags::RESET) {
@@ -93,7 +94,7 @@ impl Rate {
         }
     }
 
-    /// Takes the median of the steps that there are, and tells if it is no longer what it was.
+    /// Computes the median of the collected steps, and warns if the rate became right or wrong.
     fn look(&mut self, now_ns: i64) {
         let was_right = self.found_hz.is_none() || self.is_right();
         let found_hz = 1e9 / median(&mut self.periods_ns[..self.count]);
@@ -110,7 +111,7 @@ impl Rate {
         tracing::warn!("{}", self.told(found_hz));
     }
 
-    /// What a person reads of a rate that has changed to `found_hz`.
+    /// Returns the warning for a rate that has changed to `found_hz`.
     fn told(&self, found_hz: f64) -> String {
         let (who, learnt_hz) = (&self.who, self.learnt_hz);
         if same(learnt_hz, found_hz) {
@@ -121,13 +122,13 @@ impl Rate {
         )
     }
 
-    /// Whether the stream has the rate. Of the first few samples nobody knows yet.
+    /// Returns whether the stream has the rate; false until the first median.
     pub fn is_right(&self) -> bool {
         self.found_hz
             .is_some_and(|found| same(self.learnt_hz, found))
     }
 
-    /// What is wrong with a stream that never had the rate, once that shows.
+    /// Returns a message if the stream never had the rate, once that is certain.
     pub fn fault(&self) -> Option<String> {
         let (learnt, found) = (self.learnt_hz, self.found_hz?);
         (!self.was_right && self.wrong >= NEVER).then(|| {
@@ -138,7 +139,7 @@ impl Rate {
     }
 }
 
-/// Samples a second of recordings, from the median of their steps; `None` where there are no two stamps.
+/// Returns the sample rate of recordings \[Hz\], from the median of their steps; `None` without two different stamps.
 pub(crate) fn of(lessons: &[&[Lesson]]) -> Option<f64> {
     let samples = lessons.iter().flat_map(|lessons| lessons.iter());
     let mut periods_ns: Vec<i64> = samples
@@ -146,12 +147,12 @@ pub(crate) fn of(lessons: &[&[Lesson]]) -> Option<f64> {
         .map(|pair| pair[1].header.stamp_ns - pair[0].header.stamp_ns)
         .filter(|period_ns| *period_ns > 0)
         .collect();
-    // Three decimals, which every reader gives back unchanged.
+    // Three decimals survive writing to and reading from any file format.
     let hz = |period_ns: f64| (1e12 / period_ns).round() / 1e3;
     (!periods_ns.is_empty()).then(|| hz(median(&mut periods_ns)))
 }
 
-/// Whether two rates are one, for all that clocks do.
+/// Returns whether two rates are equal within the tolerance for clocks.
 pub(crate) fn same(learnt_hz: f64, found_hz: f64) -> bool {
     (found_hz / learnt_hz - 1.0).abs() <= SAME
 }
@@ -165,7 +166,7 @@ fn median(periods_ns: &mut [i64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// A second of samples at `hz`, from `stamp_ns` on; gives the stamp behind them.
+    /// Feeds one second of samples at `hz`, from `stamp_ns` on. Returns the stamp after them.
     fn second(rate: &mut Rate, stamp_ns: i64, hz: i64) -> i64 {
         let step_ns = 1_000_000_000 / hz;
         for n in 0..hz {

@@ -1,4 +1,4 @@
-//! What a detector tells of itself: its name, its settings, how it is built and how it learns.
+//! Static properties of a detector: name, settings, construction and training.
 
 use std::any::Any;
 use std::fmt::Debug;
@@ -16,8 +16,8 @@ use super::setup::Setup;
 use super::sweep::Sweeps;
 use super::trained::Trained;
 
-/// The settings of one detector, as its key of a pipeline file holds them, and everything that is known of
-/// the detector before it runs. A detector's file implements this; the table of detectors names the type.
+/// The settings of one detector under its key of a pipeline file, and the detector's properties that are known
+/// before it runs. A detector's file implements this; the table of detectors names the type.
 pub trait DetectorSettings:
     Clone
     + Debug
@@ -32,37 +32,37 @@ pub trait DetectorSettings:
 {
     /// Canonical name: its key in a pipeline file, and its name in the archive.
     const NAME: &'static str;
-    /// What it is, in a sentence for the pipeline file's schema.
+    /// Description in one sentence, for the pipeline file's schema.
     const ABOUT: &'static str;
-    /// Standard deviations from the mean score of contact-free data to its alarm where the file names no
-    /// threshold: equation 7 of Tajiri and Iwamoto.
+    /// Default threshold, in standard deviations above the mean score on contact-free data: equation 7 of Tajiri and
+    /// Iwamoto.
     const SIGMAS: f64 = 4.0;
-    /// What its score is measured in.
+    /// Unit of its score.
     const SCORE_UNIT: ScoreUnit = ScoreUnit::None;
-    /// What its training is.
+    /// Kind of its training.
     const TRAINING: Training = Training::None;
-    /// Whether chance has a part in its training.
+    /// Whether its training is random.
     const RANDOM: bool = false;
-    /// Which recordings it is made for.
+    /// Recordings for which it is intended.
     const SUITS: Suits = Suits::All;
 
-    /// The detector, for a cell. A detector that ends alarms by itself does so `hold_s` after the last
-    /// sample that it sees a contact in \[s\].
+    /// Builds the detector for a cell. A detector that ends alarms by its own rules does so `hold_s` \[s\] after the
+    /// last sample in which it sees a contact.
     ///
     /// # Errors
     /// If the cell or the settings lack what it needs.
     fn build(&self, setup: &Setup, hold_s: f64) -> Result<Box<dyn Detector>, ConfigError>;
 
-    /// These settings with what recordings teach, and the weights that go to a file of their own, if there
-    /// are any.
+    /// Learns from recordings. Returns the settings with their learnt values, and the trained weights for a separate
+    /// file, if there are any.
     ///
     /// # Errors
-    /// If the recordings hold too little or lack labels.
+    /// If the recordings contain too little data or lack labels.
     fn learn(&self, _task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
         Ok((self.clone(), None))
     }
 
-    /// The curves behind what [`learn`](Self::learn) gave, where it was tuned by some.
+    /// Returns the trade-off curves behind the tuning in [`learn`](Self::learn), if there are any.
     ///
     /// # Errors
     /// As [`learn`](Self::learn).
@@ -70,86 +70,86 @@ pub trait DetectorSettings:
         Ok(None)
     }
 
-    /// Whether a calibration measures what its score does on contact-free data, for which it must need no
-    /// more than `setup` holds.
+    /// Returns whether a calibration measures its score on contact-free data; the detector must then need nothing
+    /// beyond `setup`.
     fn is_calibrated(_setup: &Setup) -> bool {
         false
     }
 
-    /// What speaks against running it with these settings in this cell, though it can.
+    /// Returns a warning about running it with these settings in this cell, if there is one.
     fn warning(&self, _setup: &Setup) -> Option<String> {
         None
     }
 
-    /// What whoever let it learn should know of what it has learnt.
+    /// Returns a note about the learnt state for the user who ran the training, if there is one.
     fn note(&self) -> Option<String> {
         None
     }
 
-    /// Samples that it judges at once, if it judges windows.
+    /// Returns the window length \[samples\], if it judges windows.
     fn window(&self) -> Option<usize> {
         None
     }
 
-    /// What its score stays below whatever is seen, where there is such a bound.
+    /// Returns an upper bound of its score on any input, if there is one.
     fn largest_score(_trained: &Trained) -> Option<f64> {
         None
     }
 
-    /// Which of these settings an evaluation finds itself; they may not be given to it.
+    /// Returns the settings that an evaluation determines itself; they may not be given to it.
     fn found_by_evaluation(&self) -> Vec<&'static str> {
         Vec::new()
     }
 
-    /// The setting that names the file of its trained weights, for one that is trained.
+    /// Returns the setting with the path of the trained weights, if the detector is trained.
     fn trained_file(&mut self) -> Option<&mut Option<PathBuf>> {
         None
     }
 
-    /// Whether it begins to learn anew when it is told to.
+    /// Returns whether it can learn anew on request.
     fn learns_when_told(&self) -> bool {
         false
     }
 
-    /// The setting that names the file of what it learns while running, for one that does.
+    /// Returns the setting with the path of the state file, if the detector learns while running.
     fn state_file(&mut self) -> Option<&mut Option<PathBuf>> {
         None
     }
 
-    /// The file that holds what it has learnt, if its settings name one in place of it.
+    /// Returns the file of the learnt state, if the settings name a file instead of the state itself.
     fn learnt_file(&self) -> Option<&Path> {
         None
     }
 
-    /// What the file of its state holds.
+    /// Returns the schema of the state file.
     fn state_schema(_generator: &mut SchemaGenerator) -> Option<Schema> {
         None
     }
 
-    /// Goes on from what an earlier life has learnt.
+    /// Restores the state learnt in an earlier run.
     ///
     /// # Errors
-    /// If that is the state of another detector.
+    /// If the state belongs to another detector.
     fn resume(&mut self, _state: State) -> Result<(), serde_json::Error> {
         Ok(())
     }
 }
 
-/// What a detector's score is measured in.
+/// Unit of a detector's score.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ScoreUnit {
-    /// Nothing: it is a ratio, or what a net makes of scaled numbers.
+    /// Dimensionless: a ratio, or the output of a network for scaled inputs.
     None,
     /// The square of the effort's unit.
     SquaredEffort,
-    /// The square of a torque, whatever the effort is.
+    /// The square of a torque, for any effort unit.
     SquaredTorque,
     /// Newton.
     Newton,
 }
 
 impl ScoreUnit {
-    /// For a cell whose efforts are in this unit; empty where there is none.
+    /// Returns the unit's symbol for a cell with this effort unit; empty if dimensionless.
     pub fn in_words(self, effort: EffortUnit) -> &'static str {
         match (self, effort) {
             (Self::None, _) => "",
@@ -160,31 +160,31 @@ impl ScoreUnit {
     }
 }
 
-/// What the training of a detector is.
+/// Kind of a detector's training.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Training {
-    /// It has none.
+    /// No training.
     None,
     /// The fit of the twin's gains and offsets.
     Twin,
-    /// Its own.
+    /// A training of its own.
     Own,
 }
 
-/// Which recordings a detector is made for.
+/// Recordings for which a detector is intended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Suits {
-    /// All.
+    /// All recordings.
     All,
     /// A cycle that repeats.
     Cycles,
-    /// Contacts whose labels tell collisions from cooperations.
+    /// Contacts with labels that distinguish collisions from cooperations.
     Kinds,
-    /// Neither of both: a robot on ever new paths.
+    /// Paths that do not repeat, without labelled kinds.
     NewPaths,
 }
 
-/// [`DetectorSettings`] of some detector.
+/// [`DetectorSettings`] of any detector.
 pub trait AnySettings: Any + Debug + Send + Sync + erased_serde::Serialize {
     /// [`DetectorSettings::NAME`].
     fn name(&self) -> &'static str;
@@ -225,9 +225,9 @@ pub trait AnySettings: Any + Debug + Send + Sync + erased_serde::Serialize {
     /// # Errors
     /// As there.
     fn resume(&mut self, state: State) -> Result<(), serde_json::Error>;
-    /// A copy.
+    /// Returns a copy.
     fn boxed(&self) -> Box<dyn AnySettings>;
-    /// Whether `other` is of the same detector and says the same.
+    /// Returns whether `other` belongs to the same detector and has equal settings.
     fn equals(&self, other: &dyn AnySettings) -> bool;
 }
 

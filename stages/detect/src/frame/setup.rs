@@ -1,4 +1,4 @@
-//! What a detector must know of its cell and its twin.
+//! Facts about the cell and its twin that a detector needs.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,40 +10,40 @@ use tauscope_dynamics::Model;
 use super::shared::Shared;
 use super::trained::{ScoreStatistics, Trained};
 
-/// What a detector must know of its cell and its twin.
+/// Facts about the cell and its twin that a detector needs.
 #[derive(Debug, Clone, Default)]
 pub struct Setup {
     /// The cell's name, for warnings; empty where there is none.
     pub cell: String,
-    /// By joint in URDF order.
+    /// Facts about the joints, in URDF order.
     pub joints: Vec<JointSetup>,
-    /// Their names: what was learnt by joint belongs to them.
+    /// Names of the joints, to which data learnt by joint belongs.
     pub joint_names: Vec<String>,
-    /// The robot, where there is one: for the touched link and the force.
+    /// The robot model, if there is one: for the touched link and the force.
     pub model: Option<Model>,
-    /// By detector, what its score did on contact-free data.
+    /// Statistics of the scores on contact-free data, by detector.
     pub scores: BTreeMap<String, ScoreStatistics>,
-    /// The link that holds the tool, an index into the model's links; else the model says which.
+    /// The link that holds the tool (an index into the model's links). Default: the model's tool link.
     pub tool_link: Option<usize>,
-    /// The point of the tool that touches things, in that link's frame \[m\]; else its origin.
+    /// The contact point on the tool, in that link's frame \[m\]. Default: the frame's origin.
     pub contact_point_on_tool_m: Option<[f64; 3]>,
-    /// The impedance that a Cartesian controller holds the tool with, where it is known.
+    /// Impedance of the Cartesian controller that holds the tool, where known.
     pub impedance: Option<Impedance>,
-    /// By detector, those that were trained.
+    /// Trained detectors, by name.
     pub trained: BTreeMap<String, Arc<Trained>>,
-    /// What it shares with other detectors that are given the same samples; `None` shares nothing.
+    /// Values shared with other detectors of the same samples; `None` shares nothing.
     pub shared: Option<Shared>,
 }
 
 impl Setup {
-    /// What the score of `detector` does on contact-free data, as the twin says or else its training.
+    /// Returns the statistics of `detector`'s score on contact-free data: from the twin, else from its training.
     pub fn statistics(&self, detector: &str) -> Option<ScoreStatistics> {
         let trained = || self.trained.get(detector).map(|trained| trained.score());
         self.scores.get(detector).copied().or_else(trained)
     }
 }
 
-/// What a Cartesian impedance controller holds the tool with (Salt Ducaju et al., equation 1).
+/// Stiffness of a Cartesian impedance controller that holds the tool (Salt Ducaju et al., equation 1).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Impedance {
@@ -53,7 +53,7 @@ pub struct Impedance {
     pub rotational_nm_per_rad: f64,
 }
 
-/// What a detector must know of a joint.
+/// Facts about a joint that a detector needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointSetup {
     /// Gain that the twin applied \[effort unit per model unit\].
@@ -62,13 +62,13 @@ pub struct JointSetup {
     pub offset: f64,
     /// Standard deviation of the contact-free residual \[effort unit\], where known.
     pub noise: Option<f64>,
-    /// How much the measured effort changes by 1 N m at the joint \[effort unit per N m\]; NaN where
-    /// that is not known, and the joint tells nothing of a force.
+    /// Measured effort per torque at the joint \[effort unit per N m\]; NaN where unknown: the joint then gives no
+    /// information about forces.
     pub effort_per_nm: f64,
 }
 
 impl JointSetup {
-    /// Whether its effort tells a torque.
+    /// Returns whether its effort can be converted to a torque.
     pub fn tells_torque(&self) -> bool {
         self.effort_per_nm.is_finite() && self.effort_per_nm != 0.0
     }

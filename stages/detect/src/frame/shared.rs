@@ -1,21 +1,21 @@
-//! What detectors of one stream derive alike, derived once.
+//! Values common to the detectors of one stream, computed once.
 
 use std::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Handed to detectors by [`Setup::shared`](crate::Setup::shared), it lets them take from one another what
-/// they derive alike under the same settings, such as the arm's inertia in motion.
+/// Values that several detectors compute equally under equal settings, such as the arm's inertial effort. Detectors
+/// receive it through [`Setup::shared`](crate::Setup::shared).
 ///
-/// Only detectors that are given the very same samples one after the other may share, such as the
-/// detectors behind one twin in a replay: whoever sees a sample first derives, the others find it done.
+/// Only detectors that receive identical samples in turn may share, such as the detectors behind one twin in a
+/// replay: the first one to see a sample computes the value, the others reuse it.
 #[derive(Debug, Clone, Default)]
 pub struct Shared(Arc<Mutex<Vec<Box<dyn Any + Send>>>>);
 
-/// A value and the settings that it is derived under.
+/// A value and the settings under which it is computed.
 struct Under<S, T>(S, Arc<Mutex<T>>);
 
 impl Shared {
-    /// The value of this type that is shared under these settings; `new` where nobody has asked yet.
+    /// Returns the shared value of this type under these settings; the first caller creates it by `new`.
     pub(crate) fn tap<S, T>(&self, settings: S, new: impl FnOnce() -> T) -> Tap<T>
     where
         S: PartialEq + Send + 'static,
@@ -32,7 +32,7 @@ impl Shared {
     }
 }
 
-/// Something of one's own, or shared.
+/// An owned or shared value.
 #[derive(Debug)]
 pub(crate) enum Tap<T> {
     Own(Box<T>),
@@ -52,7 +52,7 @@ impl<T> Tap<T> {
     }
 }
 
-/// A copy is one's own from there on.
+/// A clone of a shared value is owned.
 impl<T: Clone> Clone for Tap<T> {
     fn clone(&self) -> Self {
         match self {

@@ -1,4 +1,4 @@
-//! The detector as a stage: twin states in, a verdict for each out.
+//! The detector as a stage: takes twin states and emits a detection for each.
 
 use tauscope_bus::{Detection, Emit, MAX_JOINTS, Name, Stage, StageError, TwinState, flags};
 
@@ -9,16 +9,16 @@ use super::isolation::{Contact, Isolation};
 use super::setup::Setup;
 use super::threshold::Threshold;
 
-/// Share of the threshold from which a score may belong to a contact, where nobody has measured what it
-/// does on contact-free data.
+/// Share of the threshold from which a score may belong to a contact, where the score on contact-free data has not
+/// been measured.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const BEGIN: f64 = 0.5;
 
-/// Who says when an alarm is raised.
+/// The rule by which an alarm is raised.
 enum Rule {
     /// A threshold on the score.
     Threshold(Alarm),
-    /// The detector, from this score on.
+    /// The detector's own rules; `threshold` is the score at which they detect a contact.
     Own { threshold: f64, events: OwnEvents },
 }
 
@@ -31,23 +31,23 @@ impl Rule {
     }
 }
 
-/// The detect stage: one detector and what all of them share.
+/// The detect stage: one detector, its alarm rule and the isolation of contacts.
 pub struct Detect {
     detector: Box<dyn Detector>,
     name: Name,
     rule: Rule,
     isolation: Isolation,
-    /// [`flags::RESET`] of a sample that the detector was not shown.
+    /// [`flags::RESET`] of a sample that was withheld from the detector.
     begins: u32,
 }
 
 impl Detect {
-    /// `detector` in a cell. Its alarm is raised at `threshold`, by default so many standard deviations above
-    /// the mean of its score, and lasts until the score has stayed below it for `hold_s` \[s\]; a detector
-    /// with rules of its own takes no threshold.
+    /// Creates the stage of `detector` in a cell. The alarm is raised at the threshold `wanted`, by default `sigmas`
+    /// standard deviations above the mean score. It lasts until the score has stayed below the threshold for
+    /// `hold_s` \[s\]. A detector with its own rules accepts no threshold.
     ///
     /// # Errors
-    /// If no threshold can be had, or one is given to a detector with rules of its own.
+    /// If no threshold can be determined, or one is given to a detector with its own rules.
     pub fn new(
         detector: Box<dyn Detector>,
         (wanted, sigmas): (&Threshold, f64),
@@ -65,7 +65,7 @@ impl Detect {
             },
             None => {
                 let threshold = wanted.resolve(detector.name(), sigmas, &setup)?;
-                // The usual range of the score: one standard deviation above its mean.
+                // Upper end of the score's baseline range: one standard deviation above its mean.
                 let low = setup.statistics(detector.name());
                 let low = low.map_or(BEGIN * threshold, |score| {
                     score.mean + score.standard_deviation
@@ -82,8 +82,9 @@ impl Detect {
         })
     }
 
-    /// What the detector makes of a sample. One with a value that is no number is not shown to it, for it would stay in filters and
-    /// means; the detector is not ready for that sample then, and a new beginning that it should have been is one at the next.
+    /// Returns the detector's judgement of a sample. A sample with a non-finite value is withheld from the detector,
+    /// because the value would persist in filters and means: the detector is not ready for that sample, and its
+    /// [`flags::RESET`] is passed on with the next one.
     fn judge(&mut self, sample: &TwinState) -> Judgement {
         let begins = sample.header.flags & flags::RESET;
         if !is_sound(sample) {
@@ -104,21 +105,21 @@ impl Detect {
         }
     }
 
-    /// What the detector has learnt while running, to be given to its next life; `None` if it learns
-    /// nothing.
+    /// Returns the state that the detector learnt while running, for the next run; `None` if it learns nothing.
     pub fn learnt(&self) -> Option<State> {
         self.detector.learnt()
     }
 
-    /// Whether it is learning just now.
+    /// Returns whether the detector is learning.
     pub fn is_learning(&self) -> bool {
         self.detector.is_learning()
     }
 }
 
 impl Detect {
-    /// Joints and place of the contact of a sample: those that the detector has `seen`, or else those that its residuals
-    /// show. A sample with a score below the threshold, while the alarm is held, does not change them.
+    /// Returns joints and place of the contact in a sample: those that the detector has `seen`, or else those that
+    /// follow from the residuals. While the alarm is held, a sample with a score below the threshold does not change
+    /// them.
     fn isolate(
         &mut self,
         sample: &TwinState,
@@ -147,7 +148,7 @@ impl Detect {
     }
 }
 
-/// Whether every value of every joint is a number.
+/// Returns whether every value of every joint is finite.
 fn is_sound(sample: &TwinState) -> bool {
     let joints = (sample.header.joint_count as usize).min(MAX_JOINTS);
     let values = [

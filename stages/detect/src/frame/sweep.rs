@@ -1,11 +1,11 @@
-//! What the thresholds of a detector that was tuned trade against each other.
+//! Trade-off curves of the thresholds of a tuned detector.
 
-/// Both curves of the paper's discussion.
+/// The two curves in the paper's discussion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sweeps {
-    /// Over `F_th`, ascending.
+    /// Detection over `F_th`, ascending.
     pub detection: Vec<ThresholdSweep>,
-    /// Over γ (or what else parts the kinds), ascending.
+    /// Classification over γ (or the detector's other bound between the kinds), ascending.
     pub class: Vec<ClassSweep>,
     /// The tuned `F_th` \[N\].
     pub force_threshold_n: f64,
@@ -13,37 +13,37 @@ pub struct Sweeps {
     pub bound: f64,
 }
 
-/// What a force threshold finds on the tuning recordings.
+/// Detection results of a force threshold on the tuning recordings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThresholdSweep {
     /// `F_th` \[N\].
     pub force_threshold_n: f64,
-    /// Collisions and cooperations (contacts of unknown kind count as collisions).
+    /// Results for collisions; contacts of unknown kind are treated as collisions.
     pub collisions: FoundSweep,
-    /// The same of cooperations.
+    /// Results for cooperations.
     pub cooperations: FoundSweep,
-    /// Detections where nothing touched the robot.
+    /// Number of detections without a contact.
     pub false_alarms: usize,
 }
 
-/// What was found of one kind.
+/// Detection results for one kind of contact.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FoundSweep {
-    /// How many were found.
+    /// Number of detected contacts.
     pub found: usize,
-    /// And how many not.
+    /// Number of missed contacts.
     pub missed: usize,
-    /// Mean time from the beginning to the detection \[s\]; NaN if none was found.
+    /// Mean delay from the start of a contact to its detection \[s\]; NaN if none was detected.
     pub mean_delay_s: f64,
 }
 
-/// What a bound between the kinds does to the contacts that were found.
+/// Classification results of a bound between the kinds, on the detected contacts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClassSweep {
-    /// The bound: below it a contact is a collision.
+    /// Bound below which a contact is a collision.
     pub bound: f64,
-    /// Share of cooperations that are told as such.
+    /// Share of cooperations that are classified as such.
     pub sensitivity: f64,
-    /// Share of collisions that are told as such.
+    /// Share of collisions that are classified as such.
     pub specificity: f64,
 }

@@ -1,4 +1,4 @@
-//! From which score on an alarm is raised.
+//! The score at which an alarm is raised.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,31 +6,30 @@ use serde::{Deserialize, Serialize};
 use super::error::ConfigError;
 use super::setup::Setup;
 
-/// From which score on the alarm is raised: at most one of the two.
+/// The score at which the alarm is raised: at most one of the two keys.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Threshold {
-    /// This many standard deviations above the mean of the score on contact-free data, which
-    /// `twin.yaml` holds. By default 4, of `momentum_observer` 3.
+    /// Threshold in standard deviations above the mean score on contact-free data; `twin.yaml` has both. Default: 4;
+    /// for `momentum_observer` 3.
     #[schemars(range(min = 0.0, max = 1000.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigmas: Option<f64>,
-    /// This score.
+    /// Threshold as an absolute score.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub score: Option<f64>,
 }
 
 impl Threshold {
-    /// Standard deviations above the mean where neither the file nor the detector says how many (equation 7 of
-    /// Tajiri and Iwamoto).
+    /// Default number of standard deviations above the mean (equation 7 of Tajiri and Iwamoto).
     /// Tuned: by Tajiri and Iwamoto (section V), on their robot.
     pub const SIGMAS: f64 = 4.0;
 
-    /// The score from which on `detector` raises the alarm (equation 7 of Tajiri and Iwamoto: mean +
-    /// k standard deviations, k being `usual` where the file does not say).
+    /// Returns the score at which `detector` raises the alarm (equation 7 of Tajiri and Iwamoto: mean +
+    /// k standard deviations, where k defaults to `usual`).
     ///
     /// # Errors
-    /// If both kinds are given, or standard deviations are wanted and nobody has measured them.
+    /// If both kinds are given, or the threshold is in standard deviations and they have not been measured.
     pub fn resolve(
         &self,
         detector: &'static str,

@@ -1,5 +1,5 @@
-//! A trained detector at rest: one safetensors file, so that numpy and `PyTorch` read the weights too.
-//! What is no array stands as JSON in its header under `tauscope`.
+//! The file of a trained detector: safetensors, so that numpy and `PyTorch` can read the weights, too.
+//! Everything that is not an array is JSON in its header under `tauscope`.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -8,21 +8,21 @@ use safetensors::{Dtype, SafeTensors};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The only version of the format so far.
+/// Current version of the format.
 const VERSION: u32 = 1;
 /// The header's key for [`Facts`].
 const KEY: &str = "tauscope";
 /// Mean and standard deviation of the score on contact-free data.
 const SCORE: &str = "score";
 
-/// A trained detector: weights, scaling, and what it was trained on.
+/// A trained detector: weights, scaling, and facts about its training.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trained {
     facts: Facts,
     arrays: BTreeMap<String, Array>,
 }
 
-/// What is known of a trained detector besides its arrays.
+/// Facts about a trained detector in addition to its arrays.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Facts {
@@ -34,20 +34,20 @@ pub struct Facts {
     pub joints: Vec<String>,
     /// Samples per second of the training data.
     pub rate_hz: f64,
-    /// Samples that it was trained on.
+    /// Number of training samples.
     pub samples: u64,
-    /// The seed of whatever is random in the training.
+    /// Seed of the random numbers in the training.
     pub seed: u64,
-    /// The signals it sees.
+    /// Settings of its input signals.
     pub signals: SignalSettings,
-    /// Samples that one score rests on.
+    /// Number of samples behind one score.
     pub window: usize,
-    /// What made this file: program version, recordings and their hashes.
+    /// Origin of this file: program version, recordings and their hashes.
     pub provenance: BTreeMap<String, String>,
 }
 
-/// The signals that a learned detector sees. They belong to its training: a trained detector brings
-/// those that it was trained with.
+/// Input signals of a learned detector. They belong to its training: a trained detector uses the settings with
+/// which it was trained.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SignalSettings {
@@ -63,14 +63,14 @@ impl Default for SignalSettings {
     fn default() -> Self {
         Self {
             observer_gain_per_s: super::momentum::gain::DEFAULT_GAIN_PER_S,
-            // About that of the twin on efforts; the paper does not give its own.
+            // About the twin's cutoff on efforts; the paper does not state its cutoff.
             cutoff_hz: 4.0,
         }
     }
 }
 
 impl SignalSettings {
-    /// What is wrong with them, if anything.
+    /// Returns the first invalid setting, if any, as a message.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         let positive = |value: f64| value > 0.0 && value.is_finite();
         if !positive(self.observer_gain_per_s) {
@@ -97,43 +97,43 @@ struct Array {
     bytes: Vec<u8>,
 }
 
-/// What is wrong with the file of a trained detector.
+/// Error in the file of a trained detector.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TrainedError {
-    /// No safetensors file.
+    /// A file that is not in safetensors format.
     #[error("not the file of a trained detector: {reason}")]
     Format {
-        /// What its reader says.
+        /// The reader's error message.
         reason: String,
     },
-    /// A safetensors file of something else.
+    /// A safetensors file without a trained detector.
     #[error(
         "not the file of a trained detector: its header has no readable `tauscope` entry ({reason})"
     )]
     Facts {
-        /// What is wrong with the entry.
+        /// The error in the header's entry.
         reason: String,
     },
-    /// Another version of the format.
+    /// An unsupported version of the format.
     #[error("a trained detector of format version {found}; this program reads version {VERSION}")]
     Version {
         /// The file's version.
         found: u32,
     },
-    /// An array that is needed and not there, or of another shape or type.
+    /// A required array that is missing or has another shape or type.
     #[error("the trained detector's `{name}` should be {wanted}, and is {found}")]
     Array {
-        /// Its name.
+        /// Name of the array.
         name: String,
-        /// Shape and type that are needed.
+        /// Required shape and type.
         wanted: String,
-        /// What is there.
+        /// Shape and type in the file.
         found: String,
     },
 }
 
 impl Trained {
-    /// A detector without arrays yet.
+    /// Creates a trained detector without arrays.
     pub(crate) fn new(facts: Facts) -> Self {
         Self {
             facts: Facts {
@@ -147,7 +147,7 @@ impl Trained {
     /// Reads the bytes of a file.
     ///
     /// # Errors
-    /// If they are not those of a trained detector.
+    /// If they are not a valid trained detector.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, TrainedError> {
         let format = |error: safetensors::SafeTensorError| TrainedError::Format {
             reason: error.to_string(),
@@ -188,10 +188,10 @@ impl Trained {
         Ok(trained)
     }
 
-    /// The bytes of its file; the same detector gives the same bytes.
+    /// Returns the bytes of its file; equal detectors give equal bytes.
     ///
     /// # Errors
-    /// If a header longer than the format allows would be needed.
+    /// If the header would be longer than the format allows.
     pub fn to_bytes(&self) -> Result<Vec<u8>, TrainedError> {
         let format = |reason: String| TrainedError::Format { reason };
         let text = serde_json::to_string(&self.facts).map_err(|error| format(error.to_string()))?;
@@ -206,17 +206,17 @@ impl Trained {
         safetensors::serialize(views, Some(header)).map_err(|error| format(error.to_string()))
     }
 
-    /// What it was trained on.
+    /// Returns the facts about its training.
     pub fn facts(&self) -> &Facts {
         &self.facts
     }
 
-    /// What made it, to be filled in by the program.
+    /// Returns its origin, to be filled in by the program.
     pub fn provenance_mut(&mut self) -> &mut BTreeMap<String, String> {
         &mut self.facts.provenance
     }
 
-    /// What its score does on contact-free data; its threshold rests on it.
+    /// Returns the statistics of its score on contact-free data, from which its threshold follows.
     pub fn score(&self) -> ScoreStatistics {
         let score = self.get_f64(SCORE, &[2]).unwrap_or(vec![f64::NAN; 2]);
         ScoreStatistics {
@@ -272,13 +272,13 @@ impl Trained {
         })
     }
 
-    /// The shape of an array, empty if it is not there.
+    /// Returns the shape of an array; empty if the array is missing.
     pub(crate) fn shape(&self, name: &str) -> &[usize] {
         self.arrays.get(name).map_or(&[], |array| &array.shape)
     }
 }
 
-/// What is read first, so that another version is called by its name.
+/// The version alone, read first, so that another version is reported as such.
 #[derive(Deserialize)]
 struct Version {
     version: u32,

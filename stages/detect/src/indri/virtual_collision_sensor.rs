@@ -2,19 +2,16 @@
 //! for Industrial Robots" (Sensors 17(5):1148, 2017), the adaptive version; the basic one is
 //! [`virtual_collision_sensor_basic`](crate::indri::virtual_collision_sensor_basic).
 //!
-//! It needs the measured and the expected effort alone, whoever computed that: no URDF. Per joint the
-//! residue |R| (equation 1) is held against the threshold `S_coll = α (m + Coll_bias) + ν` (equations 4
-//! and 17), with the estimated model error m (equations 7 to 11), what measurement noise may add (ν, not in the
-//! paper) and the bias, which is learnt and
-//! adapts once somebody asks for it (equations 12 to 16). A machine of five states tells when a
-//! collision is possible; in its safe state, Moving, nothing is tested. The score is the largest
-//! `|R_i| / S_coll_i` among the joints that are tested.
+//! It needs only the measured effort and the expected effort of any model, and no URDF. Per joint, the residue |R|
+//! (equation 1) is compared with the threshold `S_coll = α (m + Coll_bias) + ν` (equations 4 and 17). Here m is the
+//! estimated model error (equations 7 to 11) and ν a margin for measurement noise (not in the paper). The bias is
+//! learnt and adapts on request (equations 12 to 16). A machine of five states decides when a collision is possible;
+//! in its safe state, Moving, nothing is tested. The score is the largest `|R_i| / S_coll_i` among the tested joints.
 //!
-//! An alarm is a `collision`, or a `model_error` where the expected effort has been off by more than the
-//! smallest collision effort for most of the last ten seconds: a payload that was declared wrongly
-//! (remark 1).
+//! An alarm is a `collision`, or a `model_error` if the expected effort was wrong by more than the smallest
+//! collision effort for most of the last ten seconds, for example because of a wrongly declared payload (remark 1).
 //!
-//! Efforts are in the cell's unit (N m or A) throughout; what is learnt goes by the joint's name.
+//! Efforts are in the cell's unit (N m or A) throughout; the learnt values are by joint name.
 
 mod bias;
 mod blocks;
@@ -54,22 +51,22 @@ pub(crate) const NAME: &str = "virtual_collision_sensor";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// The first bias (`Coll_bias0`), by joint name or as a list in URDF order: the smallest effort that
-    /// is a collision until something is learnt \[effort unit\]. `tauscope evaluate` learns it.
+    /// The initial bias (`Coll_bias0`), by joint name or as a list in URDF order: the smallest effort treated
+    /// as a collision before learning \[effort unit\]. `tauscope evaluate` learns it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bias: Option<FirstBias>,
-    /// When learning is asked for. A message on the source's `learn` topic asks at any time.
+    /// When learning starts. A message on the source's `learn` topic starts it at any time.
     pub learn: Learn,
-    /// How long learning takes: at least one cycle of the robot's motion, better three \[s\].
+    /// Duration of learning: at least one cycle of the robot's motion, better three \[s\].
     #[schemars(range(min = 0.1, max = 86_400.0))]
     pub learning_s: f64,
-    /// Time constant with which the bias follows what is learnt while running \[s\].
+    /// Time constant with which the bias adapts to its newest estimate while running \[s\].
     #[schemars(range(min = 0.1, max = 86_400.0))]
     pub adaptation_s: f64,
     /// Factor on the threshold (equation 17).
     #[schemars(range(min = 1.0, max = 2.0))]
     pub alpha: f64,
-    /// Weight of the average against the maximum in the unsteady model error (equation 9).
+    /// Weight of the average relative to the maximum in the unsteady model error (equation 9).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub delta: f64,
     /// Time between two updates of the steady model error, `T_s` \[s\].
@@ -78,11 +75,11 @@ pub struct Settings {
     /// Low-pass on both efforts \[Hz\].
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub cutoff_hz: f64,
-    /// What was learnt so far, by joint, or the file that holds it: `learnt.yaml` as `tauscope evaluate` writes it.
+    /// The learnt state by joint, or the path of its file: `learnt.yaml` as `tauscope evaluate` writes it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learnt: Option<HereOrFile<Learnt>>,
-    /// A file that keeps what is learnt from one run to the next; it need not exist yet, and goes
-    /// before `learnt`.
+    /// State file that keeps the learnt state between runs. It need not exist yet, and takes precedence over
+    /// `learnt`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub state: Option<PathBuf>,
 }
@@ -106,7 +103,8 @@ impl Default for Settings {
 
 impl DetectorSettings for Settings {
     const NAME: &'static str = NAME;
-    const ABOUT: &'static str = "The same with a bias that is learnt and adapts.";
+    const ABOUT: &'static str =
+        "Collisions from both efforts alone, with an adaptive bias (Indri, Trapani and Lazzero).";
     const TRAINING: Training = Training::Own;
     const SUITS: Suits = Suits::Cycles;
 
@@ -159,13 +157,13 @@ impl DetectorSettings for Settings {
     }
 }
 
-/// When the sensor is asked to learn.
+/// When the sensor starts to learn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Learn {
-    /// As the first sample comes, unless something was learnt before.
+    /// At the first sample, unless there is a learnt state.
     AtStart,
-    /// When a message says so.
+    /// On a message.
     #[default]
     OnRequest,
 }
@@ -184,7 +182,7 @@ impl Settings {
     }
 }
 
-/// The first bias by joint in URDF order, checked.
+/// Returns the initial bias by joint in URDF order, validated.
 pub(crate) fn first_bias(
     detector: &'static str,
     bias: Option<&FirstBias>,
@@ -194,8 +192,8 @@ pub(crate) fn first_bias(
     bias.resolve(detector, &setup.joint_names)
 }
 
-/// The first bias by joint that `lessons` ask for: twice what would have avoided every virtual collision
-/// in the recordings it is trained on, and no less than the mean residue.
+/// Learns the initial bias by joint from the training recordings of `lessons`: twice the bias that would have
+/// avoided every virtual collision, and at least the mean residue.
 pub(crate) fn learn_first_bias(
     detector: &'static str,
     tuning: Tuning,
@@ -207,11 +205,11 @@ pub(crate) fn learn_first_bias(
     Ok(FirstBias::named(&setup.joint_names, values))
 }
 
-/// Learns the first bias, where `settings` gives none, and has the paper's learning phase (equations 12,
-/// 13 and 15) over the recordings it is trained on; the bias adapts from there.
+/// Learns the initial bias, unless `settings` has one, and runs the paper's learning phase (equations 12,
+/// 13 and 15) over the training recordings. The bias adapts from the result.
 ///
 /// # Errors
-/// If the recordings hold less than five seconds of contact-free motion, or `settings.bias` does not fit
+/// If the recordings contain less than five seconds of contact-free motion, or `settings.bias` does not fit
 /// the joints.
 pub fn learn(
     settings: &Settings,

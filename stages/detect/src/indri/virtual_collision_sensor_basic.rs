@@ -21,11 +21,11 @@ pub(crate) const NAME: &str = "virtual_collision_sensor_basic";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// The bias, by joint name or as a list in URDF order: the smallest effort that is a collision
+    /// The bias, by joint name or as a list in URDF order: the smallest effort treated as a collision
     /// \[effort unit\]. `tauscope evaluate` learns it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bias: Option<FirstBias>,
-    /// Weight of the average against the maximum in the unsteady model error (equation 9).
+    /// Weight of the average relative to the maximum in the unsteady model error (equation 9).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub delta: f64,
     /// Time between two updates of the steady model error, `T_s` \[s\].
@@ -75,17 +75,17 @@ impl Settings {
                 delta: self.delta,
             },
             alpha: 1.0,
-            // Nothing adapts.
+            // Unused: the bias does not adapt.
             time_constant_s: 1.0,
         }
     }
 }
 
-/// Learns the bias from the recordings `lessons` is trained on: per joint twice the smallest bias that
-/// would have kept it silent, and no less than the mean residue. A bias that `settings` gives stays.
+/// Learns the bias from the training recordings of `lessons`: per joint, twice the smallest bias that
+/// avoids every collision alarm, and at least the mean residue. A bias in `settings` is kept.
 ///
 /// # Errors
-/// If the recordings hold less than five seconds of contact-free motion, or `settings.bias` does not fit
+/// If the recordings contain less than five seconds of contact-free motion, or `settings.bias` does not fit
 /// the joints.
 pub fn learn(
     settings: &Settings,

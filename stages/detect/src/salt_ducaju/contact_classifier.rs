@@ -1,14 +1,13 @@
 //! `contact_classifier`: Salt Ducaju, Olofsson, Robertsson and Johansson, "Fast Contact Detection and
 //! Classification for Kinesthetic Teaching in Robots using only Embedded Sensors", RO-MAN 2022.
 //!
-//! A contact is where the external force's content of the band exceeds `F_th` in any direction (equation
-//! 4, Algorithm 1: [`contact_machine`](crate::salt_ducaju::contact_machine)). It is a cooperation if, along a direction that detects it,
-//! the force grows in the sense of the motion (5), or if the force points elsewhere than the motion (6);
-//! else a collision (Algorithm 2).
+//! There is a contact if the external force's content in the band exceeds `F_th` in any direction (equation 4,
+//! Algorithm 1: [`contact_machine`](crate::salt_ducaju::contact_machine)). It is a cooperation if the force increases
+//! in the direction of motion along a direction that detects it (5), or if the force is not aligned with the motion
+//! (6); otherwise it is a collision (Algorithm 2).
 //!
-//! What does not move is hit by nobody: below `standstill_m_per_s` a contact is a cooperation, and
-//! a component of the velocity below it has no sense for (5) and counts as that much in (6), so that
-//! no noise is divided by.
+//! A tool at standstill does not collide: below `standstill_m_per_s` a contact is a cooperation. A velocity
+//! component below this limit has no sign for (5), and is raised to it in (6) to avoid a division by noise.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -32,14 +31,14 @@ const PAPERS_GAMMA: f64 = 6.2;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// How the external force is estimated and filtered.
+    /// Estimation and filtering of the external force.
     pub signals: SignalSettings,
-    /// When a contact begins and ends.
+    /// Start and end of a contact.
     pub detection: MachineSettings,
-    /// From this on condition (6) sees a cooperation (γ).
+    /// Left side of condition (6) from which a contact is a cooperation (γ).
     #[schemars(range(min = 0.0))]
     pub gamma: f64,
-    /// A tool slower than this stands still \[m/s\].
+    /// Speed below which the tool is at standstill \[m/s\].
     #[schemars(range(min = 0.0))]
     pub standstill_m_per_s: f64,
 }
@@ -107,8 +106,8 @@ impl Rule for Conditions {
     }
 }
 
-/// The left side of (6), `‖u_Ḟ ⊘ u_ξ̇‖₂`; `None` where the contact is a cooperation whatever γ: the tool
-/// stands still, or the force grows in the sense of the motion (5).
+/// Returns the left side of (6), `‖u_Ḟ ⊘ u_ξ̇‖₂`; `None` if the contact is a cooperation for any γ: the tool is at
+/// standstill, or the force increases in the direction of motion (5).
 pub fn misalignment(contact: &NewContact, standstill_m_per_s: f64) -> Option<f64> {
     let speed = length(&contact.velocity_m_per_s);
     let with_motion = |&(rise, velocity): &(f64, f64)| {
@@ -122,7 +121,7 @@ pub fn misalignment(contact: &NewContact, standstill_m_per_s: f64) -> Option<f64
         .map(|velocity| velocity.abs().max(standstill_m_per_s));
     let ratios = std::array::from_fn(|i| contact.rise_n[i] / floored[i]);
     let ratio = length(&ratios) * length(&floored) / length(&contact.rise_n);
-    // No rise at all in a contact: no direction either, and nothing that speaks for an obstacle.
+    // A contact without any rise has no direction, and no evidence of an obstacle.
     ratio.is_finite().then_some(ratio)
 }
 
@@ -130,13 +129,13 @@ fn length(vector: &[f64; 3]) -> f64 {
     vector.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Tunes `F_th` and γ on labelled recordings, and notes the impedance. `F_th` is a tenth above the largest norm of
-/// contact-free motion: nothing false first, then all that can be found. γ has the largest 2 specificity + sensitivity,
-/// of equal ones the largest ("conservatively high"), though none above the paper's where that will do.
+/// Tunes `F_th` and γ on labelled recordings, and stores the impedance. `F_th` is 10 % above the largest norm of
+/// contact-free motion: no false alarms first, then as many detections as possible. γ maximises 2 specificity +
+/// sensitivity. Among equal values it is the largest ("conservatively high"), but not above the paper's γ if that is
+/// one of them.
 ///
 /// # Errors
-/// If the training recordings name no collisions and cooperations, or hold none of one kind or no
-/// contact-free time.
+/// If the training recordings have no labels, no collisions, no cooperations, or no contact-free time.
 pub fn learn(
     settings: &Settings,
     setup: &Setup,
@@ -148,8 +147,8 @@ pub fn learn(
     Ok(learnt)
 }
 
-/// The curves behind [`learn`]: delay and false alarms against `F_th`, sensitivity and specificity
-/// against γ at the `F_th` that is learnt.
+/// Returns the trade-off curves behind [`learn`]: delay and false alarms over `F_th`, sensitivity and specificity
+/// over γ at the learnt `F_th`.
 ///
 /// # Errors
 /// As [`learn`].
@@ -179,7 +178,7 @@ fn tune(settings: &Settings, setup: &Setup, lessons: &Lessons<'_>) -> Result<Tun
     let window = settings.signals.window;
     let rule = &mut Conditions::of(settings);
     let found = contact_tuning::found(&tracks, &learnt.detection, window, rule, NAME)?;
-    // What (5) sees is a cooperation at any γ.
+    // A cooperation by (5) remains one at any γ.
     let ratio = |contact: &NewContact| misalignment(contact, settings.standstill_m_per_s);
     let ratios: Vec<_> = (found.iter())
         .map(|found| (found.kind, ratio(&found.contact).unwrap_or(f64::INFINITY)))
@@ -209,7 +208,7 @@ mod tests {
 
     #[test]
     fn a_force_that_grows_with_the_motion_is_a_cooperation() {
-        // The paper's second example, along Y: (5) decides.
+        // The paper's second example, along Y: condition (5) decides.
         let pushed = contact([0.5, 4.0, 0.1], [0.02, 0.1, -0.02], 1);
         assert_eq!(misalignment(&pushed, 0.005), None);
         assert_eq!(kind(&pushed), ContactKind::Cooperation);
@@ -222,7 +221,7 @@ mod tests {
         let ratio = misalignment(&hit, 0.005).unwrap();
         assert!((ratio - 2.97).abs() < 0.01, "{ratio}");
         assert_eq!(kind(&hit), ContactKind::Collision);
-        // 41.84 > 6.2: across the motion, were it not for (5).
+        // 41.84 > 6.2: across the motion by (6).
         let across = contact([8.367, 0.0, 5.477], [-0.01, 0.0, -0.4999], 2);
         let ratio = misalignment(&across, 0.005).unwrap();
         assert!((ratio - 41.84).abs() < 0.1, "{ratio}");
@@ -247,7 +246,7 @@ mod tests {
         let hit = contact([0.0, 0.2, 9.0], [0.0, 0.0, -0.2], 2);
         assert!(misalignment(&hit, 0.005).unwrap().is_finite());
         assert_eq!(kind(&hit), ContactKind::Collision);
-        // Detected along Y, where the velocity is noise: (5) must not tell by its sign.
+        // Detected along Y, where the velocity is noise: (5) must not use its sign.
         let across = contact([0.0, 9.0, 0.0], [0.0, 0.002, -0.2], 1);
         assert!(misalignment(&across, 0.005).is_some());
         assert_eq!(kind(&across), ContactKind::Cooperation);

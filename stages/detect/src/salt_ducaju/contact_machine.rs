@@ -1,16 +1,17 @@
-//! Contact detection after Salt Ducaju et al., Algorithm 1: when a contact began and in which
-//! directions; what it was, a [`Rule`] says.
+//! Contact detection after Salt Ducaju et al., Algorithm 1: the start of a contact and its directions. A [`Rule`]
+//! classifies the contact.
 //!
-//! What the paper leaves open, and what is done here:
+//! Points that the paper leaves open, and their solution here:
 //!
-//! - *Contact time*, "a backwards search in the external force signal": back from the detection the force
-//!   along the direction has come from its last trough; swings smaller than half a threshold
-//!   ([`SWING`]) are no trough. Of the rise from there, the contact begins where [`BEGUN`] of it were reached. Both senses
-//!   are tried, and the larger rise counts.
+//! - *Contact time*, "a backwards search in the external force signal": the force along the direction rises from its
+//!   last trough before the detection; oscillations smaller than half a threshold ([`SWING`]) are not a trough. The
+//!   contact starts where the force has completed the share [`BEGUN`] of this rise. Both signs are evaluated, and the
+//!   larger rise is used.
 //! - *Derivative of the force*: its change from the contact time to the detection. Only its direction
 //!   matters, and a difference over the whole rise has the least noise.
-//! - *Collision to free*: as the paper has it for cooperation, when no norm is above the threshold. Both
-//!   hold once that has been so for [`MachineSettings::release_s`], lest what is about to leave the window begins it again.
+//! - *Collision to free*: when no norm is above the threshold, as the paper defines it for cooperation. In both cases
+//!   this must last for [`MachineSettings::release_s`]; otherwise a force that is leaving the window could start the
+//!   contact again.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,21 +21,21 @@ use crate::frame::{Contact, ContactKind, Details, Detector, Judgement, Seen, Tap
 use crate::salt_ducaju::contact_signals::{Instant, SignalSettings, Signals};
 use crate::salt_ducaju::sliding_dft::BandError;
 
-/// A fall of the force by this share of the threshold parts one rise from another.
+/// Fall of the force, as a share of the threshold, that separates one rise from another.
 /// Tuned: on the training recordings of the practice set of assembly (docs/papers.md); not swept.
 const SWING: f64 = 0.5;
-/// A contact has begun at this share of its rise.
+/// Share of its rise at which a contact has started.
 /// Tuned: on the training recordings of the practice set of assembly (docs/papers.md); not swept.
 const BEGUN: f64 = 0.15;
 
-/// When a contact begins and ends: what the detectors after Salt Ducaju et al. share.
+/// Start and end of a contact, common to the detectors after Salt Ducaju et al.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MachineSettings {
-    /// A norm above this is a contact (`F_th`) \[N\].
+    /// Norm above which there is a contact (`F_th`) \[N\].
     #[schemars(range(min = 0.0))]
     pub force_threshold_n: f64,
-    /// A contact has ended once no norm has been above the threshold for this long \[s\].
+    /// Time without a norm above the threshold after which a contact has ended \[s\].
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub release_s: f64,
 }
@@ -49,27 +50,27 @@ impl Default for MachineSettings {
     }
 }
 
-/// A contact that has just been detected. World frame.
+/// A newly detected contact, in the world frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewContact {
-    /// When it began \[ns since the epoch\], along the direction with the largest norm.
+    /// Start \[ns since the epoch\], along the direction with the largest norm.
     pub contact_ns: i64,
-    /// Change of the external force since then \[N\].
+    /// Change of the external force since the start \[N\].
     pub rise_n: [f64; 3],
-    /// Velocity of the tool then \[m/s\].
+    /// Velocity of the tool at the start \[m/s\].
     pub velocity_m_per_s: [f64; 3],
-    /// By direction that detects it: the force's change along it since it began to rise \[N\], and the
-    /// tool's velocity along it then \[m/s\].
+    /// By direction, if it detects the contact: the force's change since the start of its rise \[N\], and the
+    /// tool's velocity at that time \[m/s\].
     pub along: [Option<(f64, f64)>; 3],
 }
 
-/// Tells collision from cooperation.
+/// Distinguishes collisions from cooperations.
 pub trait Rule: Send {
-    /// What the contact is.
+    /// Returns the kind of the contact.
     fn classify(&mut self, contact: &NewContact) -> ContactKind;
 }
 
-/// What the state is: `None` is free motion.
+/// State of the machine: kind and start of the current contact \[ns since the epoch\]; `None` in free motion.
 pub type Ongoing = Option<(ContactKind, i64)>;
 
 /// Algorithm 1. No allocation per sample.
@@ -82,16 +83,16 @@ pub struct Machine {
     newest: usize,
     length: usize,
     ongoing: Ongoing,
-    /// The contact that was detected last.
+    /// The newest detected contact.
     contact: Option<NewContact>,
-    /// Directions of the collision that goes on.
+    /// Directions of the current collision.
     active: [bool; 3],
-    /// Stamp at which a norm was last above the threshold.
+    /// Newest stamp with a norm above the threshold.
     high_ns: i64,
 }
 
 impl Machine {
-    /// In free motion; searches back through `window` instants.
+    /// Creates a machine in free motion that searches back through `window` instants.
     pub fn new(settings: &MachineSettings, window: usize) -> Self {
         let nothing = Instant {
             stamp_ns: 0,
@@ -113,14 +114,14 @@ impl Machine {
         }
     }
 
-    /// Back to free motion, and nothing remembered.
+    /// Returns to free motion and discards the history.
     pub fn reset(&mut self) {
         self.length = 0;
         self.ongoing = None;
         self.active = [false; 3];
     }
 
-    /// Takes the next instant; the same once more changes nothing.
+    /// Processes the next instant; a repeated instant changes nothing.
     pub fn step(&mut self, instant: &Instant, rule: &mut dyn Rule) -> Ongoing {
         if self.length > 0 && self.past(0).stamp_ns == instant.stamp_ns {
             return self.ongoing;
@@ -153,7 +154,7 @@ impl Machine {
         self.ongoing
     }
 
-    /// What the detector saw at the newest instant.
+    /// Returns the intermediate results of the newest instant.
     pub(crate) fn details(&self) -> Option<Details> {
         (self.length > 0).then(|| Details {
             content_n: self.past(0).norms_n,
@@ -162,12 +163,12 @@ impl Machine {
         })
     }
 
-    /// The instant `back` before the newest one.
+    /// Returns the instant `back` steps before the newest one.
     fn past(&self, back: usize) -> &Instant {
         &self.past[(self.newest + self.past.len() - back) % self.past.len()]
     }
 
-    /// The contact that the directions `new` detect at the newest instant.
+    /// Returns the contact that the directions `new` detect at the newest instant.
     fn contact(&self, now: &Instant, new: [bool; 3]) -> NewContact {
         let mut along = [None; 3];
         let (mut began, mut largest) = (0, 0.0);
@@ -187,8 +188,8 @@ impl Machine {
         }
     }
 
-    /// How many instants ago the force along a direction began to rise, and by how much it has risen
-    /// since, with the sense.
+    /// Returns the number of instants since the force along a direction started to rise, and its signed change since
+    /// then \[N\].
     fn began(&self, axis: usize) -> (usize, f64) {
         let swing = SWING * self.settings.force_threshold_n;
         let mut best = (0, 0.0_f64);
@@ -215,13 +216,13 @@ impl Machine {
     }
 }
 
-/// The unit vector; zeros for one without length.
+/// Returns the unit vector; zeros for a vector without length.
 pub(crate) fn unit(vector: [f64; 3]) -> [f64; 3] {
     let length = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
     vector.map(|x| if length > 0.0 { x / length } else { 0.0 })
 }
 
-/// A detector made of the signals, Algorithm 1 and a rule.
+/// A detector composed of the signals, Algorithm 1 and a rule.
 pub(crate) struct ContactDetector<R> {
     name: &'static str,
     signals: Tap<Signals>,
@@ -249,7 +250,7 @@ impl<R: Rule> ContactDetector<R> {
     }
 }
 
-/// A judgement of the detectors with these signals.
+/// Returns the judgement of a detector with these signals.
 pub(crate) fn judgement(instant: Option<&Instant>, ongoing: Ongoing, link: usize) -> Judgement {
     let Some(instant) = instant else {
         return Judgement {

@@ -1,5 +1,5 @@
-//! What the detectors after Salt Ducaju et al. see: external force, its frequency content, and the
-//! tool's velocity.
+//! Input signals of the detectors after Salt Ducaju et al.: external force, its frequency content, and the tool's
+//! velocity.
 
 use std::ops::RangeInclusive;
 
@@ -13,27 +13,27 @@ use crate::frame::{ConfigError, Impedance, Setup, Tap, rate};
 use crate::salt_ducaju::sliding_dft::{BandError, SlidingDft, bins};
 use crate::salt_ducaju::wrench::ToolPoint;
 
-/// How the external force is estimated and filtered: what the detectors after Salt Ducaju et al. share.
+/// Estimation and filtering of the external force, common to the detectors after Salt Ducaju et al.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SignalSettings {
     /// Gain of the momentum observer \[1/s\].
     #[schemars(range(min = 0.1, max = 100_000.0))]
     pub observer_gain_per_s: f64,
-    /// Samples in the sliding window (N).
+    /// Number of samples in the sliding window (N).
     #[schemars(range(min = 2, max = 1_000_000))]
     pub window: usize,
-    /// The band whose content is watched \[Hz\]: from no less than 1/(N h) to no more than 1/(2 h), with h
-    /// the sample period that the stamps show.
+    /// Monitored frequency band \[Hz\]: at least 1/(N h) and at most 1/(2 h), where h is the sample period according
+    /// to the stamps.
     pub band_hz: [f64; 2],
     /// Low-pass on the tool's velocity \[Hz\].
     #[schemars(range(min = 0.01, max = 10_000.0))]
     pub velocity_cutoff_hz: f64,
-    /// Samples a second of the recordings that thresholds were tuned on: they hold for no other rate.
+    /// Sample rate of the recordings on which the thresholds were tuned \[Hz\]; they are valid for no other rate.
     #[schemars(range(min = 0.01, max = 1_000_000.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tuned_rate_hz: Option<f64>,
-    /// The impedance of the cell that thresholds were tuned in.
+    /// Impedance of the cell in which the thresholds were tuned.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tuned_impedance: Option<Impedance>,
 }
@@ -52,7 +52,8 @@ impl Default for SignalSettings {
 }
 
 impl SignalSettings {
-    /// What to tell somebody who runs `detector` in a cell of another impedance than it was tuned at: the paper's "must be varied".
+    /// Returns a warning if the cell's impedance differs from the one at which `detector` was tuned; thresholds then
+    /// "must be varied" (Salt Ducaju et al.).
     pub(crate) fn warning(&self, detector: &str, setup: &Setup) -> Option<String> {
         let (tuned, now) = (self.tuned_impedance?, setup.impedance?);
         (tuned != now).then(|| {
@@ -67,29 +68,29 @@ impl SignalSettings {
     }
 }
 
-/// One instant. World frame.
+/// The signals at one instant, in the world frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instant {
     /// Stamp of the sample \[ns since the epoch\].
     pub stamp_ns: i64,
     /// External force on the robot at the tool \[N\].
     pub force_n: [f64; 3],
-    /// By direction, the L∞-norm of the force's spectrum over the band \[N\].
+    /// L∞-norm of the force's spectrum over the band, by direction \[N\].
     pub norms_n: [f64; 3],
-    /// The tool's velocity through its low-pass \[m/s\].
+    /// Low-passed velocity of the tool \[m/s\].
     pub velocity_m_per_s: [f64; 3],
-    /// The point on the tool that both are told of \[m\].
+    /// The point on the tool to which force and velocity refer \[m\].
     pub point_m: [f64; 3],
 }
 
 impl Instant {
-    /// The largest of the norms \[N\].
+    /// Returns the largest of the norms \[N\].
     pub fn largest_norm_n(&self) -> f64 {
         self.norms_n.into_iter().fold(0.0, f64::max)
     }
 }
 
-/// From a twin's samples to instants. No allocation per sample.
+/// Computes instants from a twin's samples. No allocation per sample.
 #[derive(Debug, Clone)]
 pub struct Signals {
     settings: SignalSettings,
@@ -107,7 +108,7 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// The signals of the robot of `setup`; `detector` asks for them.
+    /// Creates the signals of the robot of `setup`; `detector` is named in errors.
     ///
     /// # Errors
     /// If `setup` has no model.
@@ -121,7 +122,7 @@ impl Signals {
             return Err(ConfigError::NoModel { detector });
         };
         let velocity = Butterworth2::new(settings.velocity_cutoff_hz);
-        // A period is the distance of two samples.
+        // The sample period needs two samples.
         let settings = SignalSettings {
             window: settings.window.max(2),
             ..*settings
@@ -141,7 +142,7 @@ impl Signals {
         })
     }
 
-    /// As [`Signals::new`], shared with the other detectors that `setup` shares with.
+    /// [`Signals::new`], shared with other detectors through [`Setup::shared`].
     pub(crate) fn tap(
         settings: &SignalSettings,
         setup: &Setup,
@@ -154,18 +155,18 @@ impl Signals {
         })
     }
 
-    /// The link that the point on the tool belongs to.
+    /// Returns the link of the point on the tool.
     pub fn tool_link(&self) -> usize {
         self.tool.link()
     }
 
-    /// Why the band cannot be watched at the rate of this stream, once that is known.
+    /// Returns the reason why the band cannot be monitored at this stream's rate, once that is known.
     pub fn fault(&self) -> Option<BandError> {
         self.fault
     }
 
-    /// Takes the next sample; gives the instant, once the window is full of samples that the twin vouches
-    /// for. A repeated stamp gives the same again.
+    /// Processes the next sample. Returns the instant once the window is full of samples with [`flags::READY`]. A
+    /// repeated stamp returns the same instant again.
     pub fn update(&mut self, sample: &TwinState) -> Option<Instant> {
         let stamp_ns = sample.header.stamp_ns;
         let before_ns = self.before_ns.filter(|_| !sample.header.has(flags::RESET));
@@ -205,7 +206,7 @@ impl Signals {
         self.full = false;
     }
 
-    /// Puts a force into the window; true once it is full.
+    /// Adds a force to the window; true once the window is full.
     fn watch(&mut self, stamp_ns: i64, force_n: [f64; 3]) -> bool {
         if self.full {
             self.dft.push(force_n);
@@ -228,8 +229,8 @@ impl Signals {
         self.full
     }
 
-    /// The bins of the band, at the rate that it was tuned at. The sample period is the median over the window, so that neither jitter nor
-    /// a missing sample changes it.
+    /// Returns the bins of the band; an error if the rate differs from that of the tuning. The sample period is the
+    /// median over the window, so that neither jitter nor a missing sample changes it.
     fn bins(&mut self) -> Result<RangeInclusive<usize>, BandError> {
         let stamps = self.filling.windows(2);
         self.periods_ns.clear();

@@ -1,4 +1,4 @@
-//! Tuning of the detectors after Salt Ducaju et al. on labelled recordings, and the curves behind it.
+//! Tuning of the detectors after Salt Ducaju et al. on labelled recordings, and its trade-off curves.
 
 mod class;
 
@@ -13,41 +13,42 @@ use crate::salt_ducaju::contact_signals::{Instant, SignalSettings, Signals};
 
 pub(crate) use class::{best, sweep_class};
 
-/// A detection belongs to the contact that began last of those that began at most this long after it \[ns\].
+/// Longest time by which a detection may precede the start of its contact \[ns\]. If several contacts qualify, the
+/// detection belongs to the one that started last.
 /// Tuned: on the training recordings of the practice set of assembly (docs/papers.md); not swept.
 const BEFORE_NS: i64 = 20_000_000;
-/// And that ended at most this long before it \[ns\].
+/// Longest time by which a detection may follow the end of its contact \[ns\].
 /// Tuned: on the training recordings of the practice set of assembly (docs/papers.md); not swept.
 const AFTER_NS: i64 = 150_000_000;
-/// An arm that was let go swings for this long \[ns\].
+/// Duration of the arm's oscillation after a contact \[ns\].
 /// Tuned: on the training recordings of the practice set of assembly (docs/papers.md); not swept.
 const SWINGS_NS: i64 = 300_000_000;
-/// How far the threshold stays above what contact-free motion was seen to reach.
+/// Ratio of the threshold to the largest norm in contact-free motion.
 /// Tuned: on the training recordings of the practice set of assembly (docs/papers.md); not swept.
 const MARGIN: f64 = 1.1;
-/// Thresholds of a sweep, in equal ratios.
+/// Number of thresholds in a sweep, in equal ratios.
 /// Tuned: for the picture alone.
 const STEPS: usize = 41;
-/// From this share of the tuned one to that.
+/// First and last threshold of a sweep, relative to the tuned one.
 /// Tuned: for the picture alone.
 const SHARES: [f64; 2] = [0.25, 4.0];
 
-/// A labelled recording as the detectors see it.
+/// Signals and labels of a recording.
 #[derive(Debug, Clone)]
 pub(crate) struct Track {
     pub instants: Vec<Instant>,
     pub contacts: Vec<LabelledContact>,
 }
 
-/// What is tuned on.
+/// Data for the tuning.
 #[derive(Debug, Clone)]
 pub(crate) struct Tracks {
     pub train: Vec<Track>,
     pub validation: Vec<Track>,
-    /// Samples a second.
+    /// Sample rate \[Hz\].
     rate_hz: Option<f64>,
     impedance: Option<Impedance>,
-    /// How long a contact stays in the window \[ns\].
+    /// Length of the sliding window, during which it still contains a past contact \[ns\].
     window_ns: i64,
 }
 
@@ -56,7 +57,7 @@ impl Tracks {
         self.train.iter().chain(&self.validation)
     }
 
-    /// These settings, with what they were tuned at.
+    /// Returns the settings with the rate and impedance of the tuning.
     pub fn tuned(&self, settings: &SignalSettings) -> SignalSettings {
         SignalSettings {
             tuned_rate_hz: self.rate_hz,
@@ -66,7 +67,7 @@ impl Tracks {
     }
 }
 
-/// Runs the recordings through the signals.
+/// Computes the signals of the recordings.
 pub(crate) fn tracks(
     settings: &SignalSettings,
     setup: &Setup,
@@ -133,8 +134,8 @@ pub(crate) fn tracks(
     })
 }
 
-/// `F_th`: [`MARGIN`] times the largest norm while nothing touched the robot, so that no alarm is false. Of
-/// what then finds no contact, none could be found without one.
+/// Returns `F_th`: [`MARGIN`] times the largest norm without contact, so that there are no false alarms. A contact
+/// missed at this threshold could not be detected without false alarms.
 pub(crate) fn force_threshold(tracks: &Tracks, detector: &'static str) -> Result<f64, LearnError> {
     let rest_ns = tracks.window_ns + SWINGS_NS;
     let free = tracks.all().flat_map(|track| {
@@ -157,7 +158,7 @@ pub(crate) fn force_threshold(tracks: &Tracks, detector: &'static str) -> Result
         })
 }
 
-/// Remembers what a rule was asked.
+/// Records the contacts that a rule classifies.
 struct Asked<'a> {
     rule: &'a mut dyn Rule,
     contact: Option<NewContact>,
@@ -170,7 +171,7 @@ impl Rule for Asked<'_> {
     }
 }
 
-/// What a machine detects in a recording: stamp and contact.
+/// Returns the detections of a machine in a recording: stamp and contact.
 fn detections(
     track: &Track,
     settings: &MachineSettings,
@@ -192,7 +193,7 @@ fn detections(
     all
 }
 
-/// The place of the labelled contact that a detection at `stamp_ns` belongs to.
+/// Returns the index of the labelled contact to which a detection at `stamp_ns` belongs.
 fn owner(contacts: &[LabelledContact], stamp_ns: i64) -> Option<usize> {
     let own = |c: &LabelledContact| (c.on_ns - BEFORE_NS..=c.off_ns + AFTER_NS).contains(&stamp_ns);
     let mut latest: Option<usize> = None;
@@ -208,7 +209,7 @@ fn owner(contacts: &[LabelledContact], stamp_ns: i64) -> Option<usize> {
     latest
 }
 
-/// Whether a contact is a collision during or right after a cooperation, which Algorithm 1 does not look for.
+/// Returns whether a contact is a collision during or right after a cooperation, which Algorithm 1 does not detect.
 fn is_covered(contacts: &[LabelledContact], at: usize) -> bool {
     let contact = &contacts[at];
     let covers = |other: &LabelledContact| {
@@ -218,16 +219,16 @@ fn is_covered(contacts: &[LabelledContact], at: usize) -> bool {
     contact.kind == ContactKind::Collision && contacts.iter().any(covers)
 }
 
-/// A labelled contact that was found.
+/// A detected labelled contact.
 pub(crate) struct Found<'a> {
     pub kind: ContactKind,
     pub contact: NewContact,
-    /// From the detection on.
+    /// Instants from the detection on.
     instants: &'a [Instant],
 }
 
 impl Found<'_> {
-    /// The largest norm up to `for_ns` after the detection.
+    /// Returns the largest norm up to `for_ns` after the detection.
     pub fn largest_norm_n(&self, for_ns: i64) -> f64 {
         let end_ns = self
             .instants
@@ -241,7 +242,7 @@ impl Found<'_> {
     }
 }
 
-/// The labelled contacts of the training recordings that are found: the first detection of each.
+/// Returns the detected labelled contacts of the training recordings: the first detection of each.
 pub(crate) fn found<'a>(
     tracks: &'a Tracks,
     settings: &MachineSettings,
@@ -289,7 +290,7 @@ pub(crate) fn found<'a>(
     Ok(all)
 }
 
-/// What thresholds about that of `settings` find, and how fast.
+/// Returns detections and delays for thresholds around that of `settings`.
 pub(crate) fn sweep_threshold(
     tracks: &Tracks,
     settings: &MachineSettings,

@@ -1,11 +1,10 @@
-//! `fisher_discriminant`: the rival of [`contact_classifier`](crate::salt_ducaju::contact_classifier) in Salt Ducaju et al., section V: the
-//! same detection, and Fisher's linear discriminant (R. A. Fisher, "The statistical utilization of
-//! multiple measurements", 1938) on the same two unit vectors, that of the force's derivative and that
-//! of the tool's velocity.
+//! `fisher_discriminant`: the alternative to [`contact_classifier`](crate::salt_ducaju::contact_classifier) in Salt
+//! Ducaju et al., section V. It has the same detection, and Fisher's linear discriminant (R. A. Fisher, "The
+//! statistical utilization of multiple measurements", 1938) on the same two unit vectors: of the force's derivative
+//! and of the tool's velocity.
 //!
-//! The paper says no more of it. Here the six components are the measurements, the direction is
-//! `w = S⁻¹ (m_coll - m_coop)` with the scatter S within both kinds, and the bound lies half-way between
-//! the means.
+//! The paper gives no further details. Here the six components are the measurements, the direction is
+//! `w = S⁻¹ (m_coll - m_coop)` with the within-class scatter S, and the bound is half-way between the means.
 
 use nalgebra::Vector6;
 use schemars::JsonSchema;
@@ -28,18 +27,19 @@ pub(crate) const NAME: &str = "fisher_discriminant";
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// How the external force is estimated and filtered.
+    /// Estimation and filtering of the external force.
     pub signals: SignalSettings,
-    /// When a contact begins and ends.
+    /// Start and end of a contact.
     pub detection: MachineSettings,
-    /// What was learnt from labelled contacts; it does not run without.
+    /// Discriminant learnt from labelled contacts; required to run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub discriminant: Option<Discriminant>,
 }
 
 impl DetectorSettings for Settings {
     const NAME: &'static str = NAME;
-    const ABOUT: &'static str = "The same detection, told apart by Fisher's linear discriminant.";
+    const ABOUT: &'static str =
+        "`contact_classifier` with Fisher's linear discriminant as the classifier.";
     const SCORE_UNIT: ScoreUnit = ScoreUnit::Newton;
     const TRAINING: Training = Training::Own;
     const SUITS: Suits = Suits::Kinds;
@@ -78,7 +78,7 @@ impl Rule for Discriminant {
     }
 }
 
-/// Both unit vectors; zeros for one without length.
+/// Returns both unit vectors; zeros for a vector without length.
 fn measurements(contact: &NewContact) -> Vector6<f64> {
     let mut all = Vector6::zeros();
     all.fixed_rows_mut::<3>(0)
@@ -88,12 +88,11 @@ fn measurements(contact: &NewContact) -> Vector6<f64> {
     all
 }
 
-/// Tunes `F_th` as [`contact_classifier::learn`](crate::salt_ducaju::contact_classifier::learn) does, and learns the discriminant from the training
-/// contacts that are found.
+/// Tunes `F_th` as [`contact_classifier::learn`](crate::salt_ducaju::contact_classifier::learn) does, and learns the
+/// discriminant from the detected training contacts.
 ///
 /// # Errors
-/// If the training recordings name no collisions and cooperations, or hold none of one kind or no
-/// contact-free time.
+/// If the training recordings have no labels, no collisions, no cooperations, or no contact-free time.
 pub fn learn(
     settings: &Settings,
     setup: &Setup,
@@ -103,7 +102,8 @@ pub fn learn(
     let mut learnt = settings.clone();
     learnt.signals = tracks.tuned(&settings.signals);
     learnt.detection.force_threshold_n = contact_tuning::force_threshold(&tracks, NAME)?;
-    // Which contacts Algorithm 1 asks about depends on its answers: those that collide go on being asked about.
+    // Algorithm 1 does not classify detections during a cooperation. This rule always answers collision, so that
+    // every detection is classified.
     let mut rule = Discriminant {
         weights: [0.0; 6],
         bound: -1.0,

@@ -2,10 +2,10 @@
 //! and Aspragathos, "Contact Distinction in Human-Robot Cooperation with Admittance Control", 2016, and
 //! "A Frequency Domain Approach for Contact Type Distinction in Human-Robot Collaboration", 2018).
 //!
-//! The contact is detected as [`contact_classifier`](crate::salt_ducaju::contact_classifier) does, `F_th` in any direction. It is a collision if
-//! the largest norm exceeds a second, higher threshold, and a cooperation if it has not done so
-//! `decide_s` after the detection. Its sources have no detection of their own and so no such delay; without it
-//! every collision would begin as a cooperation, for the norm passes the lower threshold first.
+//! The contact is detected as in [`contact_classifier`](crate::salt_ducaju::contact_classifier), by `F_th` in any
+//! direction. It is a collision if the largest norm exceeds a second, higher threshold, and a cooperation if it has
+//! not done so `decide_s` after the detection. The cited papers have no separate detection and hence no such delay.
+//! Without it every collision would start as a cooperation, because the norm passes the lower threshold first.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -29,14 +29,14 @@ pub(crate) const NAME: &str = "frequency_classifier";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// How the external force is estimated and filtered.
+    /// Estimation and filtering of the external force.
     pub signals: SignalSettings,
-    /// When a contact begins and ends.
+    /// Start and end of a contact.
     pub detection: MachineSettings,
-    /// A contact whose norm exceeds this is a collision \[N\].
+    /// Norm above which a contact is a collision \[N\].
     #[schemars(range(min = 0.0))]
     pub collision_threshold_n: f64,
-    /// One that has not done so this long after its detection is a cooperation \[s\].
+    /// Time from the detection after which a contact that did not exceed this norm is a cooperation \[s\].
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub decide_s: f64,
 }
@@ -55,7 +55,8 @@ impl Default for Settings {
 
 impl DetectorSettings for Settings {
     const NAME: &'static str = NAME;
-    const ABOUT: &'static str = "The same detection, told apart by the frequency content alone.";
+    const ABOUT: &'static str =
+        "`contact_classifier` with the frequency content alone as the criterion.";
     const SCORE_UNIT: ScoreUnit = ScoreUnit::Newton;
     const TRAINING: Training = Training::Own;
     const SUITS: Suits = Suits::Kinds;
@@ -117,7 +118,8 @@ impl Detector for FrequencyClassifier {
     }
 }
 
-/// Says cooperation to every contact, so that the machine holds it until it ends and asks no more.
+/// Classifies every contact as a cooperation, so that the machine holds it until it ends and does not classify it
+/// again.
 struct Undecided;
 
 impl Rule for Undecided {
@@ -126,13 +128,13 @@ impl Rule for Undecided {
     }
 }
 
-/// The decision.
+/// Classification by frequency content.
 struct ByContent {
     machine: Machine,
     force_threshold_n: f64,
     collision_threshold_n: f64,
     decide_ns: i64,
-    /// Beginning and detection of the contact that goes on, and what it is by now.
+    /// The current contact: start, detection, and kind once it is decided.
     contact: Option<(i64, i64, Option<ContactKind>)>,
 }
 
@@ -173,12 +175,12 @@ impl ByContent {
     }
 }
 
-/// Tunes `F_th` as [`contact_classifier::learn`](crate::salt_ducaju::contact_classifier::learn) does, and the higher threshold as that does γ, on the
-/// largest norm of the training contacts up to the decision.
+/// Tunes `F_th` as [`contact_classifier::learn`](crate::salt_ducaju::contact_classifier::learn) does. Tunes the
+/// higher threshold by the criterion used there for γ, on the largest norm of the training contacts up to the
+/// decision.
 ///
 /// # Errors
-/// If the training recordings name no collisions and cooperations, or hold none of one kind or no
-/// contact-free time.
+/// If the training recordings have no labels, no collisions, no cooperations, or no contact-free time.
 pub fn learn(
     settings: &Settings,
     setup: &Setup,
@@ -191,13 +193,13 @@ pub fn learn(
     let window = settings.signals.window;
     let found = contact_tuning::found(&tracks, &learnt.detection, window, &mut Undecided, NAME)?;
     let decide_ns = (settings.decide_s * 1e9) as i64;
-    // The larger the norm, the more a collision: bounds are those of its negative.
+    // A collision has a larger norm, whereas `sweep_class` expects smaller values: use the negative norm.
     let norms: Vec<_> = found
         .iter()
         .map(|found| (found.kind, -found.largest_norm_n(decide_ns)))
         .collect();
     let [low, high] = contact_tuning::best(&contact_tuning::sweep_class(&norms, f64::NEG_INFINITY));
-    // Half-way, in ratio, between the contacts on either side.
+    // Geometric mean of the norms of the contacts on either side.
     learnt.collision_threshold_n = (low * high).sqrt().max(learnt.detection.force_threshold_n);
     Ok(learnt)
 }

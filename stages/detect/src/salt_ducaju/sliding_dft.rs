@@ -1,25 +1,24 @@
 //! The frequency content of a vector over a sliding window (Salt Ducaju et al., section II-B).
 //!
-//! Bin k of the discrete Fourier transform of the newest N samples, at k / (N h), follows every sample
-//! by one addition: what enters counts with the phase of its place in the cycle of N samples, and what
-//! leaves, N samples later, with the same phase. So it is taken out to the last bit but for the
-//! rounding of sums, and of one bin after the other the sum is begun anew with each cycle: the error
-//! stays that of a few cycles for ever. Only lengths are asked for, so that the cycle's own phase does
-//! not matter.
+//! Bin k of the discrete Fourier transform of the newest N samples, at k / (N h), is updated by one addition per
+//! sample. A value enters with the phase of its place in the cycle of N samples, and leaves N samples later with
+//! the same phase. So it is removed exactly, except for the rounding of the sum. In each cycle, the sum of one bin is
+//! computed anew, one bin after the other, so that the rounding error does not accumulate. Only magnitudes are used,
+//! so the phase of the cycle does not matter.
 //!
-//! The paper leaves the normalisation out. Here it is 2/N: a sine of amplitude A at a bin's frequency
+//! The paper does not state the normalisation. Here it is 2/N: a sine of amplitude A at a bin's frequency
 //! gives A.
 
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
-/// Directions.
+/// Number of directions.
 const AXES: usize = 3;
 
-/// Why a band cannot be had.
+/// Reason why a band cannot be monitored.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum BandError {
-    /// Below what the window resolves.
+    /// A lower limit below the resolution of the window.
     #[error(
         "a band from {min_hz} Hz needs a window longer than 1/{min_hz} s, and {window} samples at {rate_hz:.1} Hz last {seconds:.3} s: take more samples or a higher lower limit"
     )]
@@ -33,19 +32,19 @@ pub enum BandError {
         /// Length of the window \[s\].
         seconds: f64,
     },
-    /// Above half the rate.
+    /// An upper limit above half the sample rate.
     #[error(
         "a band up to {max_hz} Hz needs more than {needed} samples a second, and there are {rate_hz:.1}: take a lower upper limit"
     )]
     TooHigh {
         /// Upper limit \[Hz\].
         max_hz: f64,
-        /// Twice that.
+        /// Twice the upper limit \[Hz\].
         needed: f64,
         /// Samples per second.
         rate_hz: f64,
     },
-    /// Not the rate that thresholds were tuned at.
+    /// A sample rate other than that of the tuning.
     #[error(
         "its thresholds were tuned at {tuned_hz:.1} samples a second, and here are {rate_hz:.1}: let `tauscope evaluate` tune it on recordings of this rate"
     )]
@@ -73,17 +72,17 @@ pub enum BandError {
     },
 }
 
-/// The bins of a window of `window` samples, `period_s` apart, whose frequencies are within the band
-/// \[Hz\]: from no less than 1/(N h) to no more than 1/(2 h).
+/// Returns the bins, for a window of `window` samples `period_s` apart, whose frequencies are within the band
+/// \[Hz\]. The band is limited to 1/(N h) up to 1/(2 h).
 ///
 /// # Errors
-/// If the window cannot resolve a limit, or no bin is left.
+/// If the window cannot resolve a limit, or there is no bin within the band.
 pub fn bins(
     window: usize,
     period_s: f64,
     [min_hz, max_hz]: [f64; 2],
 ) -> Result<RangeInclusive<usize>, BandError> {
-    // Clocks are as good as a part in a thousand.
+    // Tolerance for clocks: one part in a thousand.
     let slack = 1.0 + 1e-3;
     let rate_hz = 1.0 / period_s;
     let spacing_hz = rate_hz / window as f64;
@@ -127,39 +126,39 @@ pub struct SlidingDft {
     at: usize,
     bins: Vec<Group>,
     count: usize,
-    /// By direction, the largest squared length of any bin.
+    /// Largest squared magnitude of any bin, by direction.
     most: [f64; AXES],
-    /// The bin whose sum is begun anew in this cycle, and that sum.
+    /// The bin whose sum is computed anew in this cycle, and that sum.
     renewed: usize,
     fresh: [[f64; 2]; AXES],
 }
 
-/// How many bins are followed at once, that the processor may take several in one instruction.
+/// Number of bins updated together, so that the compiler can use SIMD instructions.
 const LANES: usize = 4;
 type Lanes = [f64; LANES];
 
-/// Bins that are followed at once; one that is not wanted stays zero. Complex numbers are real and imaginary parts.
+/// Bins updated together; an unused one stays zero. Complex numbers are stored as real and imaginary parts.
 #[derive(Debug, Clone, Copy, Default)]
 struct Group {
-    /// e^(-2πi k/N), and that to the power of the place in the cycle.
+    /// e^(-2πi k/N), and its power by the place in the cycle.
     turn: [Lanes; 2],
     phase: [Lanes; 2],
-    /// By direction.
+    /// Sums by direction.
     sums: [[Lanes; 2]; AXES],
 }
 
-/// Multiplication and addition lane by lane.
+/// Evaluates `f` for each lane.
 fn lanes(f: impl Fn(usize) -> f64) -> Lanes {
     std::array::from_fn(f)
 }
 
 impl Group {
-    /// The phase as at the beginning of a cycle.
+    /// Resets the phase to the start of a cycle.
     fn rewind(&mut self) {
         self.phase = [[1.0; LANES], [0.0; LANES]];
     }
 
-    /// Adds `change` in the present phase, and goes on to the next; raises `most` to the squared lengths.
+    /// Adds `change` with the current phase, and advances the phase; raises `most` to the squared magnitudes.
     #[inline]
     fn push(&mut self, change: [f64; AXES], most: &mut [Lanes; AXES]) {
         let [phase_re, phase_im] = self.phase;
@@ -178,13 +177,13 @@ impl Group {
     }
 }
 
-/// As the processor has it: no matter which of two that cannot be compared.
+/// Returns the larger value, without the special case for NaN, so that it compiles to one instruction.
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
 impl SlidingDft {
-    /// An empty window of `window` samples, at least one, over no bin.
+    /// Creates an empty window of `window` samples, at least one, without bins.
     pub fn new(window: usize) -> Self {
         Self {
             ring: vec![[0.0; AXES]; window.max(1)],
@@ -197,7 +196,7 @@ impl SlidingDft {
         }
     }
 
-    /// Empties the window and takes up these bins.
+    /// Empties the window and sets the bins.
     pub fn set_bins(&mut self, bins: RangeInclusive<usize>) {
         self.ring.fill([0.0; AXES]);
         self.at = 0;
@@ -218,17 +217,17 @@ impl SlidingDft {
         self.rewind();
     }
 
-    /// Phases as at the beginning of a cycle.
+    /// Resets all phases to the start of a cycle.
     fn rewind(&mut self) {
         self.bins.iter_mut().for_each(Group::rewind);
-        // The lanes beyond the last bin hear nothing.
+        // The lanes after the last bin stay zero.
         if let Some(last) = self.bins.last_mut() {
             let used = (self.count - 1) % LANES + 1;
             last.phase[0][used..].fill(0.0);
         }
     }
 
-    /// Takes the newest value; the oldest leaves.
+    /// Adds the newest value and removes the oldest.
     pub fn push(&mut self, value: [f64; AXES]) {
         let old = std::mem::replace(&mut self.ring[self.at], value);
         let (group, lane) = (self.renewed / LANES, self.renewed % LANES);
@@ -247,7 +246,7 @@ impl SlidingDft {
         self.most = most.map(|lanes| lanes.into_iter().fold(0.0, larger));
         self.at += 1;
         if self.at == self.ring.len() {
-            // A cycle is over: every cycle sees the same phases, bit for bit.
+            // End of a cycle: every cycle uses the same phases, bit for bit.
             self.at = 0;
             self.rewind();
             let fresh = std::mem::take(&mut self.fresh);
@@ -260,7 +259,7 @@ impl SlidingDft {
         }
     }
 
-    /// By direction, the largest length of any bin (the L∞-norm over the band) times 2/N; 0 over no bin.
+    /// Returns the largest magnitude of any bin (the L∞-norm over the band) times 2/N, by direction; 0 without bins.
     pub fn norms(&self) -> [f64; AXES] {
         let n = self.ring.len() as f64;
         self.most.map(|squared| squared.sqrt() * 2.0 / n)
@@ -328,7 +327,7 @@ mod tests {
     fn rounding_does_not_add_up() {
         let mut dft = SlidingDft::new(50);
         dft.set_bins(1..=20);
-        // A blow that leaves nothing but rounding behind, then a million quiet samples.
+        // Large values that leave only rounding errors behind, then a million zero samples.
         for i in 0..50 {
             dft.push([1e9 * f64::from(i).sin(); AXES]);
         }

@@ -1,9 +1,9 @@
-//! What the five learned methods of Tajiri and Iwamoto (section IV-B, 3 to 7) share: the signals they
-//! see, equation 8's scaling, the support vector machine, the nets and how they are trained, and the
-//! file that a trained detector is kept in ([`crate::Trained`]).
+//! Common parts of the five learned methods of Tajiri and Iwamoto (section IV-B, 3 to 7): the input
+//! signals, the scaling of equation 8, the support vector machine, the networks and their training, and
+//! the file of a trained detector ([`crate::Trained`]).
 //!
-//! The support vector machine is libsvm-rs's; nets are trained by [`mod@training`], on whole batches. A trained
-//! net is run by loops of its own, a sample at a time. Tests hold the two against each other.
+//! The support vector machine is that of libsvm-rs. Networks are trained by [`mod@training`] on whole batches. The
+//! inference of a trained network is implemented separately, one sample at a time; tests compare the two.
 
 mod autoencoder;
 mod lstm;
@@ -31,20 +31,20 @@ pub(crate) use lstm::Lstm;
 pub(crate) use one_class::OneClass;
 pub(crate) use runner::Load;
 
-/// Settings of a detector that runs as it was trained: all but the file of its weights are those of its training.
+/// Settings of a trained detector. All settings except the file of its weights apply only to its training.
 pub(crate) trait TrainedSettings: Clone + Default {
     /// Canonical name.
     const NAME: &'static str;
-    /// What it is, in a sentence.
+    /// Description in one sentence.
     const ABOUT: &'static str;
-    /// Whether chance has a part in its training.
+    /// Whether its training is random.
     const RANDOM: bool;
-    /// What its score is measured in.
+    /// Unit of its score.
     const SCORE_UNIT: ScoreUnit = ScoreUnit::None;
-    /// Reads what scores from the file.
+    /// Reads the scorer from a trained detector.
     const LOAD: Load;
 
-    /// The file, one that `tauscope evaluate` wrote.
+    /// Returns the setting with the path of the trained detector, a file that `tauscope evaluate` wrote.
     fn model(&mut self) -> &mut Option<PathBuf>;
 
     /// Trains it on the contact-free part of the training recordings.
@@ -53,17 +53,17 @@ pub(crate) trait TrainedSettings: Clone + Default {
     /// If there is no robot's model, too little data, or the training diverges.
     fn train(&self, task: &Task<'_>) -> Result<Trained, LearnError>;
 
-    /// Samples that it judges at once, if it judges windows.
+    /// Returns the window length \[samples\], if it judges windows.
     fn window(&self) -> Option<usize> {
         None
     }
 
-    /// What its score stays below whatever is seen, where there is such a bound.
+    /// Returns an upper bound of its score on any input, if there is one.
     fn largest_score(_trained: &Trained) -> Option<f64> {
         None
     }
 
-    /// How a net is trained where the file does not say.
+    /// Returns the default training settings, if it is a network.
     fn training(&self) -> Option<TrainingSettings> {
         None
     }
@@ -107,31 +107,31 @@ where
     }
 }
 
-/// How a net is trained: Adam on the mean squared error.
+/// Training of a network: Adam on the mean squared error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TrainingSettings {
-    /// How often all training data is gone through.
+    /// Number of passes over all training data.
     pub epochs: usize,
     /// Samples or windows in one step.
     pub batch: usize,
-    /// Share of each middle layer's units that is left out at a step.
+    /// Share of each hidden layer's units that is dropped at a step.
     pub dropout: f64,
     /// Adam's step size.
     pub learning_rate: f64,
 }
 
-/// The same as files have it: what is left out is the detector's own.
+/// Training of a network in the pipeline file; omitted keys have the detector's defaults.
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "TrainingSettings")]
 pub(crate) struct GivenTraining {
-    /// How often all training data is gone through.
+    /// Number of passes over all training data.
     #[schemars(range(min = 1))]
     epochs: Option<usize>,
     /// Samples or windows in one step.
     #[schemars(range(min = 1))]
     batch: Option<usize>,
-    /// Share of each middle layer's units that is left out at a step.
+    /// Share of each hidden layer's units that is dropped at a step.
     #[schemars(range(min = 0.0, max = 0.9))]
     dropout: Option<f64>,
     /// Adam's step size.
@@ -139,7 +139,7 @@ pub(crate) struct GivenTraining {
     learning_rate: Option<f64>,
 }
 
-/// What a file says of the training, and the detector's own in the place of what it leaves out.
+/// Reads the training settings from a file, with the detector's defaults for omitted keys.
 pub(crate) fn training<'de, S: TrainedSettings, D: Deserializer<'de>>(
     file: D,
 ) -> Result<TrainingSettings, D::Error> {
@@ -155,7 +155,7 @@ pub(crate) fn training<'de, S: TrainedSettings, D: Deserializer<'de>>(
 }
 
 impl TrainingSettings {
-    /// Refuses what cannot be trained with.
+    /// Validates the settings.
     pub(crate) fn check(&self, detector: &'static str) -> Result<(), LearnError> {
         demand(detector, self.epochs > 0, "`epochs` must be at least 1")?;
         demand(detector, self.batch > 0, "`batch` must be at least 1")?;
@@ -166,7 +166,7 @@ impl TrainingSettings {
     }
 }
 
-/// An error that says what a setting must be, unless it is so.
+/// Returns an error with the requirement `what` on a setting, unless it is met.
 pub(crate) fn demand(
     detector: &'static str,
     is_so: bool,

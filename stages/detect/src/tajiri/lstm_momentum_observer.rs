@@ -1,9 +1,9 @@
 //! `lstm_momentum_observer`: Tajiri and Iwamoto, "Collision Detection for Robot Arm Assisted with Digital Twin
 //! System", section IV-B 5, after Lim et al. 2021.
 //!
-//! A recurrent net learns from contact-free motion what the momentum observer takes for external torque
-//! though nothing touches the arm: friction and errors of the model. It sees q(t), q̇(t) and q̇(t-1), scaled
-//! by equation 8. The score is the squared length of what the observer sees beyond the net's estimate.
+//! A recurrent network learns from contact-free motion the external torque that the momentum observer estimates
+//! without a contact, because of friction and model errors. Its inputs are q(t), q̇(t) and q̇(t-1), scaled by
+//! equation 8. The score is the squared length of the observed torque minus the network's estimate.
 
 use std::path::PathBuf;
 
@@ -13,22 +13,22 @@ use serde::{Deserialize, Serialize};
 use crate::frame::{LearnError, ScoreUnit, SignalSettings, Task, Trained};
 use crate::tajiri::learned::{self, GivenTraining, Load, Lstm, TrainedSettings, TrainingSettings};
 
-/// Settings of `lstm_momentum_observer`. All but `model` are those of its training.
+/// Settings of `lstm_momentum_observer`. All except `model` apply to its training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// The trained detector, a file that `tauscope evaluate` wrote.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<PathBuf>,
-    /// The signals it sees.
+    /// Settings of its input signals.
     pub signals: SignalSettings,
-    /// Samples in a training sequence, and before the first score.
+    /// Number of samples in a training sequence, and before the first score.
     #[schemars(range(min = 2, max = 100_000))]
     pub sequence: usize,
-    /// Units of the recurrent layer.
+    /// Number of units of the recurrent layer.
     #[schemars(range(min = 1, max = 10_000))]
     pub hidden: usize,
-    /// How it is trained. `batch` counts samples: 1000 are ten sequences of 100.
+    /// Training of the network. `batch` is a number of samples: 1000 are ten sequences of 100.
     #[serde(deserialize_with = "learned::training::<Settings, _>")]
     #[schemars(with = "GivenTraining")]
     pub training: TrainingSettings,
@@ -54,7 +54,7 @@ impl Default for Settings {
 impl TrainedSettings for Settings {
     const NAME: &'static str = "lstm_momentum_observer";
     const ABOUT: &'static str =
-        "Momentum observer less what an LSTM expects of it (Tajiri and Iwamoto, after Lim et al.).";
+        "Momentum observer minus an LSTM's estimate of it (Tajiri and Iwamoto, after Lim et al.).";
     const SCORE_UNIT: ScoreUnit = ScoreUnit::SquaredTorque;
     const RANDOM: bool = true;
     const LOAD: Load = Lstm::scorer;

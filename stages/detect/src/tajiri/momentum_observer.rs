@@ -1,9 +1,9 @@
 //! `momentum_observer`: Tajiri and Iwamoto, section IV-B 2 ("Naive MOB"): the squared length of the external
 //! torque that the [momentum observer](crate::frame::momentum) estimates.
 //!
-//! The observer is that of the rigid body: like [`naive_difference`](crate::tajiri::naive_difference) it undoes the
-//! twin's gain and offset. The paper gives all methods low-pass filtered data; the observer is linear in the
-//! efforts, so the same low-pass stands behind it.
+//! The observer uses the rigid-body model: like [`naive_difference`](crate::tajiri::naive_difference) it undoes the
+//! twin's gain and offset. The paper uses low-pass filtered data for all methods; the observer is linear in the
+//! efforts, so the same low-pass is applied to its output.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,8 +18,8 @@ use crate::frame::{
 /// Canonical name.
 pub(crate) const NAME: &str = "momentum_observer";
 
-/// Where its alarm is raised if the file does not say: the paper's best threshold for it is mean + σ,
-/// that of its own method mean + 4 σ.
+/// Default threshold, in standard deviations above the mean score. The paper's best threshold is mean + σ for this
+/// method, and mean + 4 σ for the paper's own method.
 /// Tuned: between the two, by hand; not swept.
 pub(crate) const SIGMAS: f64 = 3.0;
 
@@ -39,7 +39,8 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             gain_per_s: DEFAULT_GAIN_PER_S,
-            // With the observer's own 10 ms as late as the twin's low-pass of 4.5 Hz on efforts (√2 / ω); the paper does not give its own.
+            // Together with the observer's 10 ms, this has the delay of the twin's low-pass of 4.5 Hz on efforts (√2
+            // / ω). The paper does not state its cutoff.
             cutoff_hz: 5.6,
         }
     }
@@ -48,7 +49,7 @@ impl Default for Settings {
 impl DetectorSettings for Settings {
     const NAME: &'static str = NAME;
     const ABOUT: &'static str =
-        "Squared length of the external torque that a momentum observer of the rigid body sees.";
+        "Squared length of the external torque estimated by a momentum observer of the rigid body.";
     const SCORE_UNIT: ScoreUnit = ScoreUnit::SquaredTorque;
     const SIGMAS: f64 = SIGMAS;
 
@@ -75,7 +76,7 @@ struct Naive {
     observer: MomentumObserver,
     /// Gain and offset by joint, as the twin applied them.
     regression: Vec<(f64, f64)>,
-    /// By joint, on the observed torque.
+    /// Low-passes on the observed torque, by joint.
     filters: Vec<Butterworth2>,
     settling_ns: i64,
     previous_ns: Option<i64>,
@@ -92,7 +93,7 @@ impl Detector for Naive {
         let mut plain = [0.0; MAX_JOINTS];
         let corrected = sample.expected_effort.iter().zip(&self.regression);
         for (plain, (effort, (gain, offset))) in plain.iter_mut().zip(corrected) {
-            // A gain of zero has wiped the model's effort out: nothing is left to compare with.
+            // A gain of zero has removed the model's effort: there is nothing to compare with.
             if *gain != 0.0 {
                 *plain = (effort - offset) / gain;
             }

@@ -1,7 +1,7 @@
 //! `naive_difference`: Tajiri and Iwamoto, section IV-B 1: [`twin_regression`](crate::tajiri::twin_regression)
 //! with gain 1 and offset 0.
 //!
-//! The twin's low-pass is linear with gain 1 at rest, so the regression can be undone behind it; one
+//! The twin's low-pass is linear with static gain 1, so the regression can be undone after it; one
 //! twin stage serves both detectors.
 
 use crate::frame::{ConfigError, Detector, DetectorSettings, Judgement, ScoreUnit, Setup};
@@ -12,14 +12,15 @@ use tauscope_bus::{MAX_JOINTS, TwinState, flags};
 /// Canonical name.
 pub(crate) const NAME: &str = "naive_difference";
 
-/// Settings of `naive_difference`: none, its filters are the twin's.
+/// Settings of `naive_difference`: none. The filters are the twin's.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {}
 
 impl DetectorSettings for Settings {
     const NAME: &'static str = NAME;
-    const ABOUT: &'static str = "The same without the regression: gain 1, offset 0.";
+    const ABOUT: &'static str =
+        "`twin_regression` without the regression: gain 1, offset 0 (Tajiri and Iwamoto).";
     const SCORE_UNIT: ScoreUnit = ScoreUnit::SquaredEffort;
 
     fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
@@ -50,7 +51,7 @@ impl Detector for NaiveDifference {
         let score = (0..joint_count)
             .map(|j| {
                 let (gain, offset) = self.regression[j];
-                // A gain of zero has wiped the model's effort out: nothing is left to compare with.
+                // A gain of zero has removed the model's effort: there is nothing to compare with.
                 let model = if gain == 0.0 {
                     0.0
                 } else {

@@ -1,8 +1,8 @@
 //! `point_autoencoder`: Tajiri and Iwamoto, "Collision Detection for Robot Arm Assisted with Digital Twin
 //! System", section IV-B 4.
 //!
-//! An autoencoder over the external torques that the momentum observer sees at one sample,
-//! scaled by equation 8. The score is the mean square of what it does not give back.
+//! An autoencoder over the external torques that the momentum observer estimates at one sample,
+//! scaled by equation 8. The score is the mean squared reconstruction error.
 
 use std::path::PathBuf;
 
@@ -14,21 +14,21 @@ use crate::tajiri::learned::{
     self, Autoencoder, GivenTraining, Load, TrainedSettings, TrainingSettings,
 };
 
-/// Samples that a score rests on.
+/// Number of samples behind one score.
 const WINDOW: usize = 1;
 
-/// Settings of `point_autoencoder`. All but `model` are those of its training.
+/// Settings of `point_autoencoder`. All except `model` apply to its training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// The trained detector, a file that `tauscope evaluate` wrote.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<PathBuf>,
-    /// The signals it sees.
+    /// Settings of its input signals.
     pub signals: SignalSettings,
-    /// Units of the middle layers.
+    /// Number of units of each hidden layer.
     pub layers: Vec<usize>,
-    /// How it is trained.
+    /// Training of the network.
     #[serde(deserialize_with = "learned::training::<Settings, _>")]
     #[schemars(with = "GivenTraining")]
     pub training: TrainingSettings,

@@ -2,8 +2,8 @@
 //! System", section IV-B 3.
 //!
 //! A one-class support vector machine with a Gaussian kernel over the external torques that the momentum
-//! observer sees at one sample, scaled by equation 8, ν = 0.1. The score is
-//! `ρ - Σ α_i k(x_i, x)`: positive outside of the boundary that holds all but a share ν of the training data.
+//! observer estimates at one sample, scaled by equation 8, ν = 0.1. The score is
+//! `ρ - Σ α_i k(x_i, x)`: positive outside the boundary that encloses all but a share ν of the training data.
 
 use std::path::PathBuf;
 
@@ -13,22 +13,22 @@ use serde::{Deserialize, Serialize};
 use crate::frame::{LearnError, SignalSettings, Task, Trained};
 use crate::tajiri::learned::{Load, OneClass, TrainedSettings};
 
-/// Samples that a score rests on.
+/// Number of samples behind one score.
 const WINDOW: usize = 1;
 
-/// Settings of `point_ocsvm`. All but `model` are those of its training.
+/// Settings of `point_ocsvm`. All except `model` apply to its training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// The trained detector, a file that `tauscope evaluate` wrote.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<PathBuf>,
-    /// The signals it sees.
+    /// Settings of its input signals.
     pub signals: SignalSettings,
-    /// Upper bound of the share of training data outside of the boundary.
+    /// Upper bound of the share of training data outside the boundary.
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub nu: f64,
-    /// It is trained on a sample every so many samples.
+    /// Distance between two training samples \[samples\].
     #[schemars(range(min = 1))]
     pub stride: usize,
 }

@@ -1,9 +1,9 @@
 //! `twin_regression`: Tajiri and Iwamoto, "Collision Detection for Robot Arm Assisted with Digital
 //! Twin System", equations 5 to 7.
 //!
-//! The score is the squared length of the residual vector: measured effort less the twin's effort
-//! after the regression of equations 3 and 4, both through the same low-pass (the twin stage does
-//! that). The alarm is raised where it reaches mean + 4 standard deviations of the score on
+//! The score is the squared length of the residual vector: measured effort minus the twin's effort
+//! after the regression of equations 3 and 4, both filtered by the same low-pass in the twin stage.
+//! The alarm is raised when the score reaches the mean + 4 standard deviations of the score on
 //! contact-free data.
 
 use crate::frame::{
@@ -16,7 +16,7 @@ use tauscope_bus::{TwinState, flags};
 /// Canonical name.
 pub(crate) const NAME: &str = "twin_regression";
 
-/// Settings of `twin_regression`: none, its filters are the twin's.
+/// Settings of `twin_regression`: none. The filters are the twin's.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {}

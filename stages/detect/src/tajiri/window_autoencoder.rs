@@ -1,9 +1,8 @@
 //! `window_autoencoder`: Tajiri and Iwamoto, "Collision Detection for Robot Arm Assisted with Digital Twin
 //! System", section IV-B 7.
 //!
-//! An autoencoder over the external torques that the momentum observer sees at 16 samples in a row
-//! (Park et al. 2021),
-//! scaled by equation 8. The score is the mean square of what it does not give back.
+//! An autoencoder over the external torques that the momentum observer estimates at 16 consecutive samples
+//! (Park et al. 2021), scaled by equation 8. The score is the mean squared reconstruction error.
 
 use std::path::PathBuf;
 
@@ -15,24 +14,24 @@ use crate::tajiri::learned::{
     self, Autoencoder, GivenTraining, Load, TrainedSettings, TrainingSettings,
 };
 
-/// Settings of `window_autoencoder`. All but `model` are those of its training.
+/// Settings of `window_autoencoder`. All except `model` apply to its training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// The trained detector, a file that `tauscope evaluate` wrote.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<PathBuf>,
-    /// The signals it sees.
+    /// Settings of its input signals.
     pub signals: SignalSettings,
-    /// Samples in a window.
+    /// Number of samples in a window.
     #[schemars(range(min = 1, max = 10_000))]
     pub window: usize,
-    /// It is trained on a window every so many samples.
+    /// Distance between two training windows \[samples\].
     #[schemars(range(min = 1))]
     pub stride: usize,
-    /// Units of the middle layers.
+    /// Number of units of each hidden layer.
     pub layers: Vec<usize>,
-    /// How it is trained.
+    /// Training of the network.
     #[serde(deserialize_with = "learned::training::<Settings, _>")]
     #[schemars(with = "GivenTraining")]
     pub training: TrainingSettings,

@@ -1,50 +1,53 @@
-//! When a contact is said to be there.
+//! Beginning and end of an alarm, from the score.
 
 use super::windows::Windows;
 
-/// An alarm ends where the score has stayed below this share of the threshold.
+/// Share of the threshold below which the score must stay for an alarm to end.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const RELEASE: f64 = 0.35;
-/// Or below this share of the largest score of the contact, as far as that is no more than the threshold: once less than
-/// a tenth of the residual is left, the rest is how an arm under a stiff controller swings back onto its path.
-/// Tuned: on seeds 811 and 812 of `tests/contacts/cyclic.py` with `reference_twin.py` and 841 of `paths.py`, swept over
-/// 0, 0.0025, 0.01 and 0.04 ([docs/papers.md](../../../../docs/papers.md#time-in-alarm-after-a-contact)).
+/// Share of the contact's largest score that replaces [`RELEASE`] where it is higher, up to the threshold. Once less
+/// than a tenth of the residual is left, this rest comes from an arm under a stiff controller that swings back onto
+/// its path.
+/// Tuned: on seeds 811 and 812 of `tests/contacts/cyclic.py` with `reference_twin.py` and 841 of `paths.py`, swept
+/// over 0, 0.0025, 0.01 and 0.04 ([docs/papers.md](../../../../docs/papers.md#time-in-alarm-after-a-contact)).
 const GONE: f64 = 0.01;
-/// For so long \[s\].
+/// Duration for which the score must stay that low \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const HOLD_S: f64 = 0.1;
-/// Another contact on top of one: the residual changes by this many times the threshold against what it has been, and that is no
-/// release.
+/// Smallest change of the residual against the followed contact that can be another contact on top of it, as a
+/// multiple of the threshold. A release does not count.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CHANGE: f64 = 2.0;
-/// What the residual has been is followed with this time constant \[s\].
+/// Time constant with which the residual of a contact is followed \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const FOLLOW_S: f64 = 0.15;
-/// Another contact does not begin sooner than this after the last alarm \[s\].
+/// Minimum time between an alarm and another contact on top of it \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const AGAIN_S: f64 = 0.25;
-/// One contact may swell and still be one: the change must be this share of what it has been as well.
+/// Smallest change that is another contact, as a share of the followed contact; a smaller one is a swell of the same
+/// contact.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SWELL: f64 = 0.5;
-/// Where kinds are told apart, it is another one, too, if the change points elsewhere: no more than this share of it along the contact (the cosine).
+/// Cosine between change and contact below which even a change smaller than [`SWELL`] is another contact. It applies
+/// only where contacts are classified.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
 const ELSEWHERE: f64 = 0.92;
-/// A contact that only falls is released: its change points against it by more than this (the cosine).
+/// Negative cosine between change and contact beyond which the change is a release, not another contact.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const FALLS: f64 = 0.7;
-/// After this \[s\] instead of [`AGAIN_S`], one that is as large as a swell would have to be and points elsewhere.
+/// Minimum time instead of [`AGAIN_S`] for a change larger than [`SWELL`] in another direction ([`TURNS`]) \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
 const SOON_S: f64 = 0.1;
-/// It points elsewhere: no more than this share of it lies along the contact (the cosine).
+/// Cosine between change and contact below which [`SOON_S`] applies.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
 const TURNS: f64 = 0.5;
-/// Where kinds are told, the alarm waits so long for the force to show where it points \[s\].
+/// Delay of an alarm where contacts are classified, in which the direction of the force becomes clear \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
 const DECIDE_S: f64 = 0.012;
-/// A score from this share of the threshold on may already belong to a contact.
+/// Share of the threshold above which a score may already belong to a contact.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LOW: f64 = 0.3;
-/// An alarm that lasts.
+/// An active alarm.
 #[derive(Debug)]
 #[allow(clippy::struct_field_names, reason = "a unit stands in each name")]
 struct Alarm {
@@ -52,27 +55,27 @@ struct Alarm {
     raised_ns: i64,
     newest_high_ns: i64,
     newest_ns: i64,
-    /// The largest score since it was raised.
+    /// Largest score since the alarm was raised.
     largest: f64,
 }
 
 impl Alarm {
-    /// The score below which the contact seems to be over.
+    /// Returns the score below which the contact appears to be over.
     fn release(&self, threshold: f64) -> f64 {
         (GONE * self.largest).clamp(RELEASE * threshold, threshold)
     }
 }
 
-/// Follows a score.
+/// Raises and ends alarms from a score.
 #[derive(Debug)]
 pub(crate) struct Watch {
     threshold: f64,
-    /// Whether kinds are told.
+    /// Whether contacts are classified.
     tells_kinds: bool,
     alarm: Option<Alarm>,
-    /// Newest sample whose score was usual.
+    /// Newest sample whose score was too low for a contact.
     newest_low_ns: Option<i64>,
-    /// When the score rose above the threshold, while the alarm waits, or when another contact came on top.
+    /// Start of a pending alarm: the time at which the score crossed the threshold, or another contact came on top.
     waits_since_ns: Option<i64>,
 }
 
@@ -95,7 +98,7 @@ impl Watch {
         self.threshold
     }
 
-    /// From now on the threshold is another one.
+    /// Sets another threshold.
     pub fn retune(&mut self, threshold: f64) {
         self.threshold = threshold;
     }
@@ -105,23 +108,23 @@ impl Watch {
         self.newest_low_ns = None;
     }
 
-    /// No contact is there.
+    /// Ends the alarm, also a pending one.
     pub fn end(&mut self) {
         self.alarm = None;
         self.waits_since_ns = None;
     }
 
-    /// When the contact that is there began, if there is one.
+    /// Returns the start of the present contact, if there is one.
     pub fn contact_ns(&self) -> Option<i64> {
         self.alarm.as_ref().map(|alarm| alarm.contact_ns)
     }
 
-    /// When the alarm was raised that lasts.
+    /// Returns the time at which the present alarm was raised, if there is one.
     pub fn raised_ns(&self) -> Option<i64> {
         self.alarm.as_ref().map(|alarm| alarm.raised_ns)
     }
 
-    /// Takes the next score; where an alarm is raised by it, says since when it has been on its way \[ns\].
+    /// Takes the next score. If it raises an alarm, returns the time since which the alarm has been pending \[ns\].
     pub fn step(&mut self, now_ns: i64, score: f64, windows: &mut Windows) -> Option<i64> {
         let raised = if self.alarm.is_some() {
             self.on_top(now_ns, score, windows)
@@ -135,7 +138,7 @@ impl Watch {
         raised
     }
 
-    /// Whether the alarm has waited long enough, if it is to wait.
+    /// Returns the time since which the alarm has been pending, unless the alarm has to wait longer.
     fn decides(&mut self, now_ns: i64) -> Option<i64> {
         let since_ns = *self.waits_since_ns.get_or_insert(now_ns);
         let decides = !self.tells_kinds || now_ns - since_ns >= ns(DECIDE_S);

@@ -1,9 +1,9 @@
-//! What contact-free time teaches while the detector runs: how often the score exceeds what by chance.
+//! Estimates the threshold again from contact-free time while the detector runs.
 //!
-//! After a minute of contact-free data few peaks are known, so the threshold stands higher than it had to
-//! ([`Tail`] takes the upper limit of what such peaks may come from). Each further hour without contacts tells more. The
-//! threshold only falls: what was learnt from data that somebody knew to be contact-free is its upper bound. Light contacts
-//! that raise no alarm would otherwise become usual.
+//! A minute of contact-free data contains few peaks, so the threshold is higher than necessary ([`Tail`] uses the
+//! upper confidence limit of the tail). Each further hour without contacts makes the estimate more precise. The
+//! threshold learnt from data that are known to be contact-free is an upper bound. Otherwise light contacts that
+//! raise no alarm would raise the threshold.
 
 use std::collections::VecDeque;
 
@@ -12,40 +12,42 @@ use tauscope_bus::TwinState;
 use super::learnt::Learnt;
 use super::tail::{BLOCK_S, Tail};
 
-/// Blocks that are remembered.
-/// Statistical: an hour tells a threshold of five false alarms an hour; more would remember what the arm no longer does.
+/// Number of blocks that are kept.
+/// Statistical: an hour suffices for a threshold of five false alarms an hour; older blocks may no longer represent
+/// the arm.
 const REMEMBERED: usize = 3600;
-/// A tail is told from at least so many blocks, and again after so many.
-/// Statistical: 120 blocks have 18 above the level, whose mean is known to a quarter.
+/// Minimum number of blocks to estimate the tail, and (`AGAIN`) number of new blocks between two estimates.
+/// Statistical: 18 of 120 blocks are above the level, and the relative standard error of their mean is a quarter.
 const LEAST: usize = 120;
 const AGAIN: usize = 60;
-/// A block counts where a joint was faster than this in half of it \[rad/s, m/s\]: a standing arm tells little of one that moves.
-/// Physical: as slow as a joint is that counts as standing.
+/// Speed that a joint must exceed in half of a block for the block to count \[rad/s, m/s\]: the peaks of a stationary
+/// arm do not represent a moving one.
+/// Physical: the highest speed of a joint that is treated as stationary.
 const MOVES: f64 = 0.03;
 
-/// The largest score of each block in which the arm moved.
+/// Largest score of each block in which the arm moved.
 #[derive(Debug)]
 pub(super) struct GoingOn {
-    /// The threshold as it was learnt, and for how many false alarms an hour.
+    /// Learnt threshold, and its number of false alarms per hour.
     most: f64,
     per_hour: f64,
-    /// Roots of the largest scores.
+    /// Square roots of the largest scores.
     blocks: VecDeque<f64>,
     scratch: Vec<f64>,
-    /// The block that goes on.
+    /// Present block: its number, largest score, samples and samples in motion.
     block: i64,
     peak: f64,
     samples: usize,
     moving: usize,
-    /// Whether there is an alarm in it, or was one in the block before.
+    /// Whether there is an alarm in the present block, and whether there was one in the block before.
     alarm: bool,
     was_alarm: bool,
-    /// Blocks since the threshold was told.
+    /// Blocks since the last estimate of the threshold.
     since_told: usize,
 }
 
 impl GoingOn {
-    /// From what was learnt, for so many false alarms an hour.
+    /// Starts from the learnt state, for `per_hour` false alarms an hour.
     pub fn new(learnt: &Learnt, per_hour: f64) -> Self {
         let mut blocks = VecDeque::with_capacity(REMEMBERED);
         let newest = learnt.peaks_since.len().saturating_sub(REMEMBERED);
@@ -65,12 +67,12 @@ impl GoingOn {
         }
     }
 
-    /// What it has seen, to be given to its next life.
+    /// Returns the peaks, to be kept for the next run.
     pub fn peaks(&self) -> Vec<f32> {
         self.blocks.iter().map(|root| *root as f32).collect()
     }
 
-    /// Takes the next score, and, where there is an alarm, the threshold that it was raised at.
+    /// Takes the next score and, during an alarm, the threshold at which the alarm was raised.
     pub fn add(&mut self, sample: &TwinState, joints: usize, score: f64, alarm: Option<f64>) {
         let block = sample.header.stamp_ns.div_euclid((BLOCK_S * 1e9) as i64);
         if block != self.block {
@@ -80,7 +82,7 @@ impl GoingOn {
         let speed = sample.velocity[..joints].iter();
         self.moving += usize::from(speed.fold(0.0, |most, v| f64::max(most, v.abs())) > MOVES);
         match alarm {
-            // A peak by chance is known to be as high as that, and a contact counts no higher.
+            // A false alarm is a peak of at least the threshold; a contact must not count for more.
             Some(threshold) if !self.alarm => (self.peak, self.alarm) = (threshold, true),
             None if !self.alarm => self.peak = self.peak.max(score),
             _ => {}
@@ -88,7 +90,7 @@ impl GoingOn {
     }
 
     fn end_block(&mut self, next: i64) {
-        // A contact is one peak, and its end belongs to it.
+        // A contact is one peak: the block after one with an alarm may contain its end and does not count.
         if 2 * self.moving > self.samples && !self.was_alarm {
             if self.blocks.len() == REMEMBERED {
                 self.blocks.pop_front();
@@ -101,12 +103,12 @@ impl GoingOn {
         (self.samples, self.moving) = (0, 0);
     }
 
-    /// Whether it is time to ask for the threshold again.
+    /// Returns whether the threshold should be estimated again.
     pub fn is_due(&self) -> bool {
         self.since_told >= AGAIN && self.blocks.len() >= LEAST
     }
 
-    /// The threshold, for all that is known now.
+    /// Estimates the threshold from all peaks so far.
     pub fn threshold(&mut self) -> f64 {
         self.since_told = 0;
         if self.blocks.len() < LEAST {
@@ -124,7 +126,7 @@ mod tests {
     const SAMPLES: i64 = 10;
     const MOST: f64 = 64.0;
 
-    /// What was learnt from a minute, with this threshold.
+    /// State learnt from one minute, with [`MOST`] as its threshold.
     fn learnt() -> Learnt {
         Learnt {
             rate_hz: 10.0,
@@ -145,7 +147,8 @@ mod tests {
         }
     }
 
-    /// The threshold after so many blocks with these scores; `alarms` gives the threshold of a block with an alarm.
+    /// Returns the threshold after this number of blocks with these scores; `alarms` gives the threshold of a block
+    /// with an alarm.
     fn after(
         blocks: usize,
         velocity: f64,

@@ -1,8 +1,9 @@
-//! Collision or cooperation, by what is known as the alarm is raised.
+//! Classification of a contact as collision or cooperation as its alarm is raised.
 //!
-//! What runs into something does so with its tool and is pushed back: a force on the tool explains the residual, and
-//! points against the tool's motion (Salt Ducaju et al., section II-C, assumption A1). A hand that means to lead may touch any link, from any
-//! side, and a tool at rest. And what is stiff pushes back at once, a hand takes its time. Fisher's linear discriminant weighs that.
+//! In a collision the tool runs into something and is pushed back: a force on the tool explains the residual and
+//! points against the tool's motion (Salt Ducaju et al., section II-C, assumption A1). A person who guides the robot
+//! may touch any link, from any side, also while the tool is at rest. A stiff obstacle builds up its force at once, a
+//! hand more slowly. Fisher's linear discriminant weighs these measurements.
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -11,23 +12,25 @@ use super::place::ToolTouch;
 use super::{NAME, Tauscope};
 use crate::frame::{ContactKind, Detector, Discriminant, Lessons, Moments, Setup};
 
-/// A tool slower than this has no direction of motion \[m/s\].
+/// Tool speed below which its direction of motion is undefined \[m/s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const STANDSTILL_M_PER_S: f64 = 0.005;
-/// No force is told smaller than this \[N\].
+/// Force that is added before taking the logarithm, so that smaller forces are hardly distinguished \[N\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEAST_FORCE_N: f64 = 0.3;
-/// An alarm belongs to the contact that began last, from so much before its beginning \[ns\].
+/// Time before the start of a labelled contact from which an alarm is assigned to it \[ns\]. Of several contacts, the
+/// alarm is assigned to the one that began last.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const BEFORE_NS: i64 = 20_000_000;
-/// To so much behind its end \[ns\].
+/// Time after the end of a labelled contact up to which an alarm is assigned to it \[ns\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const AFTER_NS: i64 = 150_000_000;
-/// So many contacts of either kind are needed.
+/// Minimum number of contacts of each kind.
 /// Statistical: three measurements need as many contacts of a kind to span them.
 const LEAST: usize = 3;
 
-/// What the kinds are told by: how far the residual rises as by a force on the tool against its motion (from -1 to 1), and the
+/// Returns the measurements that distinguish the kinds. The first is the share of the residual's rise that a force on
+/// the tool explains, times the cosine between this force and the reversed motion (from -1 to 1). The others are the
 /// logarithms of the tool's speed before the contact and of that force.
 pub(crate) fn measurements(touch: &ToolTouch) -> Vector6<f64> {
     let (force_n, speed) = (touch.force_n.norm(), touch.velocity_m_per_s.norm());
@@ -47,7 +50,7 @@ pub(crate) fn measurements(touch: &ToolTouch) -> Vector6<f64> {
     )
 }
 
-/// What kind of contact it is.
+/// Classifies a contact.
 pub(crate) fn classify(kinds: &Discriminant, measurements: &Vector6<f64>) -> &'static str {
     if Vector6::from(kinds.weights).dot(measurements) > kinds.bound {
         "collision"
@@ -56,8 +59,8 @@ pub(crate) fn classify(kinds: &Discriminant, measurements: &Vector6<f64>) -> &'s
     }
 }
 
-/// Learns from the training contacts that the detector finds; nothing where the labels do not name both kinds, or the
-/// robot is not known.
+/// Learns from the training contacts that the detector finds; `None` if the labels do not name both kinds or there is
+/// no model of the robot.
 pub(crate) fn learn(
     learnt: &Learnt,
     settings: &super::Settings,
@@ -78,7 +81,7 @@ pub(crate) fn learn(
         return None;
     }
     let mut found: Vec<(ContactKind, Vector6<f64>)> = Vec::new();
-    // As it will run: it takes its time to tell the kinds.
+    // Delays alarms as in operation, so that contacts can be classified.
     let mut detector = Tauscope::new(learnt, settings, setup, true);
     for lesson in lessons.train {
         let mut newest_on_ns = None;
@@ -96,7 +99,7 @@ pub(crate) fn learn(
                 (contact.on_ns - BEFORE_NS..=contact.off_ns + AFTER_NS).contains(&now)
             });
             let contact = contacts.max_by_key(|contact| contact.on_ns);
-            // What is said of a contact counts as it is found.
+            // Only the first alarm of a contact counts.
             if let (Some(contact), Some(seen)) = (contact, detector.measurements)
                 && newest_on_ns.replace(contact.on_ns) < Some(contact.on_ns)
             {
@@ -121,19 +124,19 @@ impl KindContacts {
         }
     }
 
-    /// What to know of what was learnt from so few, if the prior outweighs them.
+    /// Returns a note if the prior outweighs the robot's own contacts.
     pub(super) fn note(&self) -> Option<String> {
         let [collisions, cooperations] = self.counts;
         (collisions.min(cooperations) < PRIOR_CONTACTS).then(|| {
             format!(
-                "{NAME} tells kinds by its prior more than by this robot's contacts: the prior weighs as {PRIOR_CONTACTS} contacts of a kind, and it found {collisions} collisions and {cooperations} cooperations to learn from"
+                "{NAME} classifies contacts by its prior more than by this robot's contacts: the prior counts as {PRIOR_CONTACTS} contacts of each kind, and it found {collisions} collisions and {cooperations} cooperations to learn from"
             )
         })
     }
 }
 
-/// The prior counts as so many contacts of either kind: a robot's own few contacts turn the discriminant towards what parts its
-/// kinds, and do not make it.
+/// Weight of the prior, as a number of contacts of each kind: few contacts of the robot's own adjust the discriminant
+/// towards what separates its kinds, but do not determine it.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
 const PRIOR_CONTACTS: f64 = 40.0;
 /// Mean measurements of collisions and cooperations.
@@ -152,7 +155,7 @@ const PRIOR_COVARIANCE: [[f64; MEASURED]; MEASURED] = [
     [0.001, 0.079, 0.378],
 ];
 
-/// What is usual of the measurements, as [`PRIOR_CONTACTS`] contacts of either kind would tell it.
+/// Returns the moments of the prior, with the weight of [`PRIOR_CONTACTS`] contacts of each kind.
 fn prior() -> Moments {
     let six = |x: [f64; MEASURED]| Vector6::from_fn(|i, _| x.get(i).copied().unwrap_or(0.0));
     let mut scatter = Matrix6::zeros();

@@ -1,24 +1,25 @@
-//! What the twin misses of the arm's inertia because its acceleration comes late.
+//! Inertial effort that the twin lacks because its acceleration lags.
 //!
-//! An acceleration has to be low-passed, so the twin knows of a move only when it has been going on for a while: where an arm sets off or stops, the residual
-//! holds its inertia times what the acceleration lacks. The change of velocity tells that at once (as in a momentum observer: Haddadin, De Luca and
-//! Albu-Schäffer 2017, section III-D), but brings noise along.
+//! An acceleration has to be low-passed, so the twin sees a motion only some time after it began. Where an arm starts
+//! or stops, the residual contains the inertia times the acceleration that the twin lacks. The change of velocity
+//! shows this at once (as in a momentum observer: Haddadin, De Luca and Albu-Schäffer 2017, section III-D), but adds
+//! noise.
 
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
 use crate::frame::momentum::Inertia;
 use crate::frame::{Lesson, Lessons, Setup, Tap};
 
-/// What the twin misses, by joint; NaN where that is not known. No allocation per sample.
+/// Inertial effort that the twin lacks, by joint; NaN where it is unknown. No allocation per sample.
 #[derive(Debug)]
 pub(crate) struct Late {
     inertia: Option<Tap<Inertia>>,
-    /// By joint \[effort unit per N m\].
+    /// Effort per torque, by joint \[effort unit per N m\].
     effort_per_nm: JointArray,
 }
 
 impl Late {
-    /// Of the robot of `setup`.
+    /// Creates the estimator for the robot of `setup`.
     pub fn new(setup: &Setup) -> Self {
         let mut effort_per_nm = [f64::NAN; MAX_JOINTS];
         for (per_nm, joint) in effort_per_nm.iter_mut().zip(&setup.joints) {
@@ -32,7 +33,8 @@ impl Late {
         }
     }
 
-    /// Mean over the step to the next sample of M times what the twin's acceleration lacks \[effort unit\].
+    /// Returns the mean over the step to the next sample of M times the acceleration that the twin lacks \[effort
+    /// unit\].
     pub fn next(&mut self, sample: &TwinState) -> JointArray {
         let Some(inertia) = &mut self.inertia else {
             return [f64::NAN; MAX_JOINTS];
@@ -45,7 +47,7 @@ impl Late {
     }
 }
 
-/// The same of all samples of recordings.
+/// [`Late`] of all samples of recordings.
 #[derive(Debug)]
 pub(crate) struct LateIn {
     train: Vec<Vec<JointArray>>,
@@ -54,7 +56,7 @@ pub(crate) struct LateIn {
 
 impl LateIn {
     pub fn of(lessons: &Lessons<'_>, setup: &Setup) -> Self {
-        // These are other samples than those that others share.
+        // Not shared: only detectors that are given the same samples may share.
         let own = Setup {
             shared: None,
             ..setup.clone()
@@ -70,7 +72,7 @@ impl LateIn {
         }
     }
 
-    /// By recording, the training ones first.
+    /// Returns the values by recording, the training ones first.
     pub fn recordings(&self) -> impl Iterator<Item = &[JointArray]> {
         let all = self.train.iter().chain(&self.validation);
         all.map(Vec::as_slice)

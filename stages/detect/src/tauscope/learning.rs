@@ -1,4 +1,4 @@
-//! How contact-free recordings teach what is usual of a residual.
+//! Learns the baseline and the noise of the residual from contact-free recordings.
 
 use nalgebra::DMatrix;
 use tauscope_bus::{TwinState, flags};
@@ -13,38 +13,38 @@ use super::windows::Windows;
 use super::{DRIFT, NAME, noise, rest};
 use crate::frame::{LearnError, Lessons, rate};
 
-/// A joint's usual highest speed: this share of its samples is slower.
+/// Quantile of a joint's speed that serves as its reference speed.
 /// Statistical: a quantile that one sample in twenty may exceed, so that no single fast move sets it.
 const FAST: f64 = 0.95;
-/// Speed below which a joint is not taken to move at all \[rad/s\].
+/// Lower bound of the reference speed \[rad/s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEAST_FAST_RAD_S: f64 = 0.01;
-/// Correlations are believed to this share.
+/// Shrinkage factor of the correlations between joints.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const BELIEVED: f64 = 0.95;
-/// The share of contact-free samples that stays below the unit of a window's score.
-/// Statistical: what one of a thousand contact-free samples exceeds is the unit of the score.
+/// Quantile of a window's squared length over contact-free samples that is the unit of its score.
+/// Statistical: one of a thousand contact-free samples exceeds it.
 const USUAL: f64 = 0.999;
-/// The least that can be learnt from \[samples\].
+/// Minimum number of contact-free samples.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEAST_SAMPLES: usize = 500;
-/// A joint's noise and the joints' correlations count half once they are from so much; until then noise is held to what is usual of
-/// all joints (the median), and correlations to none \[s\].
+/// Contact-free time at which a joint's own noise and the correlations between joints have half of the weight \[s\].
+/// The other half goes to the median noise of all joints, and to zero correlation.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const HALF_S: f64 = 2.0;
-/// The last window is used where its noise is less than this share of that of the one before it.
+/// Largest ratio of the last window's noise to that of the window before it for the last window to be used.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const PAYS: f64 = 0.9;
-/// No joint's noise is believed below this share of what is usual of all joints.
+/// Lower bound of a joint's noise, as a share of the median noise of all joints.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEAST_NOISE: f64 = 0.02;
 
 impl Learnt {
-    /// From the contact-free stretches of all recordings. The tail is told from recordings, or pieces of one, that the noise
-    /// it is held against was not learnt from: each fold's by the noise of the others.
+    /// Learns from the contact-free stretches of all recordings. The tail is cross-validated: the score of each fold
+    /// uses the noise learnt from the other folds.
     ///
     /// # Errors
-    /// If they hold too little.
+    /// If the recordings hold too few contact-free samples.
     pub(crate) fn new(
         lessons: &Lessons<'_>,
         late: &LateIn,
@@ -68,7 +68,7 @@ impl Learnt {
         Ok(learnt)
     }
 
-    /// What is usual in these pieces, without rate and tail.
+    /// Learns everything except rate and tail from these pieces.
     fn usual(pieces: &[Piece<'_>], joint_names: &[String], follow: Follow) -> Self {
         let mut learnt = Self {
             rate_hz: 0.0,
@@ -99,7 +99,7 @@ impl Learnt {
         learnt
     }
 
-    /// Tells what of the residual is usual, where enough was seen of it.
+    /// Fits the baselines, if there is enough contact-free time.
     fn tell_usual(&mut self, all: &[Piece<'_>]) {
         if self.free_s.is_some_and(|free_s| free_s < ENOUGH_S) {
             return;
@@ -109,7 +109,8 @@ impl Learnt {
         }
     }
 
-    /// Whether the last window averages enough noise away (mean of logarithms) to be worth its delay, and enough was seen to tell.
+    /// Returns whether the last window averages enough noise away (mean of logarithms) to be worth its delay; false
+    /// if there is too little contact-free time to decide this.
     fn last_pays(&self) -> bool {
         let [.., before, last] = &self.windows[..] else {
             return false;
@@ -128,7 +129,7 @@ impl Learnt {
         noise(last) - noise(before) < PAYS.ln()
     }
 
-    /// How far what was learnt is believed, of 1.
+    /// Returns the weight of the learnt noise and correlations, from 0 to 1.
     fn believed(&self) -> f64 {
         let free_s = self.free_s.unwrap_or(f64::INFINITY);
         if free_s.is_finite() {
@@ -138,7 +139,7 @@ impl Learnt {
         }
     }
 
-    /// Holds the joints' noise to what is usual of all of them, the more the less it was learnt from.
+    /// Shrinks the joints' noise towards the median of all joints, the more the less contact-free time there is.
     fn hold_noise(&mut self) {
         let mut windows = std::mem::take(&mut self.windows);
         for window in &mut windows {
@@ -165,7 +166,8 @@ impl Learnt {
         }
     }
 
-    /// Runs over the contact-free samples, and hands the windows out at each; drift is followed where the score is below `drifts`.
+    /// Calls `visit` at each contact-free sample with the windows and the score. Drift is followed where the score is
+    /// below `drifts`.
     pub(super) fn each(
         &self,
         all: &[Piece<'_>],
@@ -230,10 +232,10 @@ impl Learnt {
         }
     }
 
-    /// The largest score of each block of contact-free time.
+    /// Returns the largest score of each block of contact-free time.
     fn peaks(&self, all: &[Piece<'_>], follow: Follow) -> Vec<f64> {
         let mut peaks = Peaks::default();
-        // As it will run.
+        // Drift is followed as in operation.
         self.each(all, follow, DRIFT, |sample, _, score| {
             peaks.add(sample.header.stamp_ns, score);
         });
@@ -241,7 +243,7 @@ impl Learnt {
     }
 }
 
-/// The largest score of each block of contact-free time, by the noise of other recordings, or pieces of one, than the block's own.
+/// Returns the largest score of each block of contact-free time, using the noise learnt from the other folds.
 fn held_out_peaks(all: &[Piece<'_>], joint_names: &[String], follow: Follow) -> Vec<f64> {
     let mut peaks = Vec::new();
     for fold in 0..FOLDS {
@@ -251,7 +253,7 @@ fn held_out_peaks(all: &[Piece<'_>], joint_names: &[String], follow: Follow) -> 
             pieces.copied().collect()
         };
         let others = match part(false) {
-            // A single piece: nothing is left to learn from without it.
+            // All pieces are in this fold: there is no other data to learn from.
             none if none.is_empty() => all.to_vec(),
             others => others,
         };

@@ -1,4 +1,4 @@
-//! What contact-free recordings have taught, as a pipeline file holds it.
+//! State learnt from contact-free recordings, as a pipeline file holds it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,123 +10,126 @@ use crate::frame::joints;
 
 pub use crate::frame::Discriminant as Kinds;
 
-/// Where speeds are divided, as shares of a joint's usual highest speed.
+/// Boundaries of the speed classes, as shares of the joint's reference speed.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const EDGES: [f64; BINS - 1] = [0.02, 0.05, 0.12, 0.3];
-/// How many classes of speed there are.
+/// Number of speed classes.
 pub(super) const BINS: usize = 5;
-/// With less than this a tail cannot be told, nor how often a threshold is exceeded \[s\].
-/// Statistical: 20 blocks of a second, of which 15 % are three peaks; fewer have no mean worth the name.
+/// Contact-free time below which neither a tail nor a rate of false alarms can be estimated \[s\].
+/// Statistical: 20 blocks of a second, of which 15 % are three peaks; the mean of fewer peaks is meaningless.
 pub(super) const ENOUGH_S: f64 = 20.0;
-/// How many measurements tell the kinds.
+/// Number of measurements for the classification of contacts.
 pub(super) const MEASURED: usize = 3;
 
-/// What contact-free recordings taught.
+/// State learnt from contact-free recordings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Learnt {
-    /// Samples a second that it was learnt from.
+    /// Sample rate of the recordings \[Hz\].
     pub rate_hz: f64,
-    /// By joint in URDF order.
+    /// Reference speed and baseline by joint, in URDF order.
     pub joints: Vec<LearntJoint>,
-    /// By window.
+    /// Noise by window, the shortest window first.
     pub windows: Vec<LearntWindow>,
-    /// Of a standing arm, where there was enough of it.
+    /// Noise of the stationary arm; absent if the recordings contain too little standstill.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rest: Option<LearntRest>,
-    /// How often the score exceeds what by chance.
+    /// Tail of the contact-free score, from which the threshold follows.
     pub tail: Tail,
-    /// Roots of the largest scores of the newest seconds in which the arm moved while the detector ran, at most an hour of
-    /// them.
+    /// Square roots of the largest scores of the newest seconds in which the arm moved while the detector ran; at
+    /// most an hour of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub peaks_since: Vec<f32>,
-    /// How much of contact-free time all of it is from \[s\].
+    /// Contact-free time from which the state was learnt \[s\].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free_s: Option<f64>,
-    /// By link, the smallest force that reaches a score of 1; empty where the robot is not known.
+    /// By link, the smallest force that reaches a score of 1; empty if there is no model of the robot.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub smallest: Vec<Smallest>,
-    /// What parts collisions from cooperations, where the labels told them.
+    /// Discriminant between collisions and cooperations, if the labels distinguish them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kinds: Option<Kinds>,
-    /// The contacts that `kinds` was learnt from.
+    /// Statistics of the contacts from which `kinds` was learnt.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kind_contacts: Option<KindContacts>,
 }
 
-/// A joint's speeds.
+/// Reference speed and baseline of a joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LearntJoint {
-    /// Its name.
+    /// Name of the joint.
     pub name: String,
-    /// Its usual highest speed \[rad/s\], by which speeds are classed.
+    /// Reference speed \[rad/s\]: the 95 % quantile of the joint's speed. The speed classes are shares of it.
     pub fast_rad_s: f64,
-    /// What of its residual is usual, where that was told.
+    /// Baseline of its residual; absent if there was too little data or it did not predict held-out recordings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub usual: Option<LearntUsual>,
 }
 
-/// The mean residual over one window.
+/// Noise of the mean residual over one window.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LearntWindow {
-    /// Root mean square by joint and class of speed, where the expected effort does not change \[effort unit\].
+    /// Root mean square by joint and speed class, while the efforts do not change \[effort unit\].
     pub noise: Vec<Vec<f64>>,
-    /// By joint, the share of what the expected effort has changed by of late that adds to it.
+    /// By joint, the noise per recent change that both efforts have in common; added as a root sum of squares.
     pub unquiet: Vec<f64>,
-    /// Inverse of the joints' correlation, row by row.
+    /// Inverse of the joints' correlation matrix, row by row.
     pub inverse_correlation: Vec<f64>,
-    /// Squared Mahalanobis length that one of a thousand contact-free samples exceeds.
+    /// Squared Mahalanobis length that one of a thousand contact-free samples exceeds: the unit of the score.
     pub usual: f64,
 }
 
-/// The class of a speed.
+/// Returns the class of a speed.
 pub(crate) fn bin(joint: &LearntJoint, speed_rad_s: f64) -> usize {
     let share = speed_rad_s / joint.fast_rad_s;
     EDGES.iter().filter(|edge| share >= **edge).count()
 }
 
-/// How the mean effort of a standing arm changes while nothing touches it.
+/// Noise of a stationary arm: changes of its mean effort while nothing touches it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LearntRest {
-    /// By window and joint, what two of three changes stay below \[effort unit\].
+    /// By window and joint, the 68.3 % quantile of the absolute changes \[effort unit\].
     pub noise: Vec<Vec<f64>>,
-    /// Squared length in units of that noise that one of a hundred contact-free samples exceeds.
+    /// Squared length of the changes, in units of that noise, that one of a hundred contact-free samples exceeds.
     pub usual: f64,
-    /// How often the score exceeds what by chance.
+    /// Tail of the contact-free score at standstill.
     pub tail: Tail,
 }
 
-/// The force on a link that reaches a score of 1 once it has lasted as long as the longest window; it grows with the root of the score.
+/// Force on a link that reaches a score of 1 once it has lasted as long as the longest window. The force for another
+/// score is proportional to the square root of the score.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Smallest {
-    /// The link.
+    /// Name of the link.
     pub link: String,
-    /// In half of the postures and directions no more is needed \[N\]; none where they are not felt.
+    /// Force that is sufficient in half of the postures and directions \[N\]; absent if the joints do not sense it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub half_n: Option<f64>,
-    /// In nine of ten of them \[N\].
+    /// Force that is sufficient in nine of ten postures and directions \[N\]; absent if the joints do not sense it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_n: Option<f64>,
 }
 
-/// The contacts that the kinds were learnt from, without the prior. Measurements are those of `kinds.rs`.
+/// Statistics of the contacts from which the kinds were learnt, without the prior. The measurements are the agreement
+/// of the residual with a force against the tool's motion (-1 to 1), the logarithm of the tool's speed, and the
+/// logarithm of the force.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KindContacts {
-    /// How many collisions and cooperations there were.
+    /// Number of collisions and of cooperations.
     pub counts: [f64; 2],
-    /// Mean measurements of either.
+    /// Mean measurements of collisions and of cooperations.
     pub means: [[f64; MEASURED]; 2],
     /// Covariance of the measurements within a kind.
     pub covariance: [[f64; MEASURED]; MEASURED],
 }
 
 impl Learnt {
-    /// What is wrong with it for a robot with these joints, as a clause.
+    /// Returns the reason why the state does not fit a robot with these joints, as a clause.
     pub(super) fn fault(&self, joint_names: &[String]) -> Option<String> {
         let found = self.joints.iter().map(|joint| &joint.name);
         if let Some(reason) = joints::in_other_order(found, joint_names) {
@@ -158,12 +161,12 @@ impl Learnt {
         }
         let mut usual = self.joints.iter().filter_map(|joint| joint.usual.as_ref());
         (!usual.all(LearntUsual::is_whole))
-            .then(|| "is not whole: what of a joint's residual is usual".to_owned())
+            .then(|| "is not whole: a joint's `usual` is incomplete or invalid".to_owned())
     }
 }
 
 impl LearntRest {
-    /// Whether it holds what `joints` need.
+    /// Returns whether it holds the noise of this number of `joints`.
     pub(super) fn is_whole(&self, joints: usize) -> bool {
         self.noise.len() == WINDOWS_S.len() && self.noise.iter().all(|noise| noise.len() == joints)
     }

@@ -7,17 +7,20 @@ use super::spans::{Follow, LONG, MIDDLE, SHORTEST, WINDOWS_S};
 use super::sums::Sums;
 use super::usual::{FEATURES, Step, Usual};
 
-/// So much of the usual noise of the next shorter window's mean a longer one's may be away from it: what has gone is not told any longer.
+/// Largest deviation of a window's mean from that of the next shorter window, in units of the shorter window's noise.
+/// It keeps a long window from reporting a contact that is over.
 /// Statistical: two standard deviations hold 95 % of Gaussian noise.
 const BORNE_OUT: f64 = 2.0;
-/// How long a joint that was slow counts as slow \[s\].
+/// Time in which the recent lowest speed of a joint recovers to its reference speed \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SLOW_MEMORY_S: f64 = 0.3;
-/// Time constant with which creep of a standing arm is followed behind a contact, and where it stood is forgotten once it moves \[s\].
+/// Time constant with which the zero of a stationary arm follows creep after a contact, and with which it decays once
+/// the arm moves \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SETTLES_S: f64 = 0.3;
 
-/// Means over the windows as far as those over the next shorter ones bear them out, with these `noise`s by window and joint.
+/// Limits the mean over each window to within [`BORNE_OUT`] times the noise around the mean over the next shorter
+/// window. `noise` is by window and joint.
 pub(super) fn borne_out(
     means: &[JointArray; WINDOWS_S.len()],
     windows: usize,
@@ -35,7 +38,7 @@ pub(super) fn borne_out(
     borne_out
 }
 
-/// Whichever is closer to 0; the first where the second is not known.
+/// Returns the value that is closer to 0; the first if the second is NaN (unknown).
 fn smaller(a: f64, b: f64) -> f64 {
     if b.abs() < a.abs() { b } else { a }
 }
@@ -44,28 +47,31 @@ fn smaller(a: f64, b: f64) -> f64 {
 #[derive(Debug)]
 pub(crate) struct Means {
     sums: Sums,
-    /// The residual that is usual just now, by joint.
+    /// Baseline of the residual, by joint.
     usual: Vec<Usual>,
-    /// What is left of the residual over each step when its change of velocity tells what the twin misses; and at the end of the newest step.
+    /// Mean residual over each step, with the lag of the twin corrected by the change of velocity; and (`newest`) the
+    /// residual before this correction at the end of the newest step.
     known: Sums,
     newest: JointArray,
-    /// What the newest sample left of the residual beside what is usual, to be followed; nothing where its offset is being learnt.
+    /// Residual of the newest sample after the baseline, from which the baseline adapts; `None` while the offset is
+    /// learnt.
     left: Option<JointArray>,
-    /// By window and joint, the mean of whichever of both is closer to 0.
+    /// By window and joint, the mean of `sums` or of `known`, whichever is closer to 0.
     nearer: [JointArray; WINDOWS_S.len()],
-    /// What is left of the residual where the arm has come to rest behind a contact.
+    /// Residual with which the arm came to rest after a contact.
     settled: JointArray,
     settings: Follow,
-    /// Step \[s\], and how much of the residual's drift is followed in it; kept, for clocks are often even.
+    /// Filter coefficients of the present time step, and the share of the drift that is followed in it. They are
+    /// cached, because sample clocks are often uniform.
     step: (Step, f64),
-    /// Smallest speed of late, by joint.
+    /// Lowest recent speed by joint \[rad/s\].
     pub slow: JointArray,
     fast: JointArray,
     start_ns: i64,
 }
 
 impl Means {
-    /// For these joints, over the first so many `windows`.
+    /// Creates the means for these joints over the first `windows` windows.
     pub fn new(joints: &[LearntJoint], settings: Follow, windows: usize) -> Self {
         let mut fast = [0.0; MAX_JOINTS];
         for (fast, joint) in fast.iter_mut().zip(joints) {
@@ -95,14 +101,15 @@ impl Means {
         self.settled = [0.0; MAX_JOINTS];
     }
 
-    /// Whether the windows are full (the last one is as good as the one before it until then), and the offset known.
+    /// Returns whether the windows up to [`LONG`] are full and the offset is known. Until the last window is full, it
+    /// serves as a shorter one.
     pub fn ready(&self) -> bool {
         let newest = self.sums.newest_ns();
         let longest = WINDOWS_S[LONG];
         (newest - self.start_ns) as f64 * 1e-9 >= longest.max(self.settings.offset_from_first_s)
     }
 
-    /// Takes a sample with what the twin misses of it.
+    /// Takes a sample with the inertial effort that the twin lacks in it.
     pub fn push(&mut self, sample: &TwinState, late: &JointArray) {
         let n = self.usual.len();
         let now = sample.header.stamp_ns;
@@ -130,7 +137,7 @@ impl Means {
             let efforts = [sample.effort[j], sample.expected_effort[j]];
             let left = efforts[0] - efforts[1] - usual.next(step, sample.velocity[j], efforts);
             let offset = if first {
-                // The mean of the first seconds, as it grows.
+                // Recursive mean over the first seconds.
                 usual.offset(left, dt_s / (since_s + dt_s).max(1e-9))
             } else {
                 0.0
@@ -155,7 +162,7 @@ impl Means {
         self.explain();
     }
 
-    /// Takes what the newest sample left of the residual for slow drift, and follows it.
+    /// Treats the newest sample's residual as slow drift, and adapts the baseline to it.
     pub fn follow(&mut self) {
         let Some(left) = self.left.take() else {
             return;
@@ -165,7 +172,8 @@ impl Means {
         }
     }
 
-    /// How late the twin is can be told from the expected effort or from the change of velocity: either errs, and what one of them explains is no contact.
+    /// Corrects the lag of the twin by the expected effort or by the change of velocity, whichever leaves less.
+    /// Either may err, and a residual that one of them explains is no contact.
     fn explain(&mut self) {
         self.nearer = self.sums.means;
         for (means, known) in self.nearer.iter_mut().zip(&self.known.means) {
@@ -175,7 +183,7 @@ impl Means {
         }
     }
 
-    /// The arm has come to rest with the residual as it is.
+    /// Takes the present residual as the new zero of the arm, which has come to rest.
     pub fn settle(&mut self) {
         let left = self.nearer[MIDDLE];
         for (settled, left) in self.settled.iter_mut().zip(&left) {
@@ -186,7 +194,7 @@ impl Means {
         self.explain();
     }
 
-    /// Where the arm has come to rest creeps, or is forgotten if it `moves`.
+    /// Lets the zero of the arm at rest follow creep, or decay if it `moves`.
     pub fn creep(&mut self, moves: bool) {
         let dt_s = self.step.0.dt_s();
         let share = dt_s / (SETTLES_S + dt_s);
@@ -195,49 +203,49 @@ impl Means {
         }
     }
 
-    /// Mean residual of a joint over a window \[effort unit\].
+    /// Returns the mean residual of a joint over a window \[effort unit\].
     pub fn mean(&self, window: usize, joint: usize) -> f64 {
         self.nearer[window][joint]
     }
 
-    /// The same, whatever the change of velocity tells.
+    /// Returns this mean without the correction by the change of velocity.
     pub fn whole(&self, window: usize, joint: usize) -> f64 {
         self.sums.means[window][joint]
     }
 
-    /// By joint, what each feature of what is usual weighs now.
+    /// Returns, by joint, the present weights of the baseline's features.
     pub fn usual_weights(&self) -> impl Iterator<Item = [f64; FEATURES]> + '_ {
         self.usual.iter().map(Usual::weights)
     }
 
-    /// How far the usual residual of a joint may be wrong \[effort unit\].
+    /// Returns the uncertainty of a joint's baseline \[effort unit\].
     pub fn doubt(&self, joint: usize) -> f64 {
         self.usual[joint].doubt()
     }
 
-    /// How much larger the noise of a joint is than usual, for all that is known of such a motion.
+    /// Returns the factor on a joint's noise for a motion that differs from the training motion.
     pub fn strange(&self, joint: usize) -> f64 {
         self.usual[joint].strange().sqrt()
     }
 
-    /// How much both efforts of a joint have changed of late \[effort unit\].
+    /// Returns the unrest of a joint: the recent change that both efforts have in common \[effort unit\].
     pub fn unrest(&self, joint: usize) -> f64 {
         self.usual[joint].unrest()
     }
 
-    /// By window.
+    /// Returns the means by window and joint.
     pub fn all(&self) -> &[JointArray; WINDOWS_S.len()] {
         &self.nearer
     }
 
-    /// Stamp of the newest sample.
+    /// Returns the stamp of the newest sample.
     pub fn newest_ns(&self) -> i64 {
         self.sums.newest_ns()
     }
 
-    /// What the shortest window's mean was at this instant.
+    /// Returns the mean of the shortest window that ended at this instant.
     pub fn earlier(&self, to_ns: i64) -> JointArray {
-        // The window is open where it begins.
+        // The window excludes its start.
         let from_ns = to_ns - (WINDOWS_S[SHORTEST] * 1e9) as i64 + 1;
         let mut mean = self.sums.rows.mean(from_ns, to_ns);
         let known = self.known.rows.mean(from_ns, to_ns);

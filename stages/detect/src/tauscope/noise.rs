@@ -1,4 +1,5 @@
-//! How large a joint's residual is without contacts: by class of its speed, and by how unquiet it is.
+//! Noise of a joint's residual without contacts, by speed class and by unrest (the recent change that both efforts
+//! have in common).
 
 use nalgebra::DMatrix;
 use tauscope_bus::{TwinState, flags};
@@ -8,18 +9,19 @@ use super::means::Means;
 use super::pieces::{Piece, free, marked};
 use super::spans::{Follow, WINDOWS_S};
 
-/// The noise of a class of speed is taken for the joint's where it has not lasted longer than this \[s\].
+/// Weight of the joint's overall noise in the noise of a speed class, as duration of observation \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const PRIOR_S: f64 = 2.0;
-/// No less than this share of a mean square is there without unrest.
+/// Lower bound of the mean square without unrest, as a share of the mean square.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const QUIET: f64 = 0.25;
 
-/// No less than this is taken for a joint's noise: of one whose residual is always 0, for its effort is not measured \[effort unit\].
+/// Lower bound of a joint's noise \[effort unit\]. It applies to a joint whose effort is not measured, so that its
+/// residual is always 0.
 /// Physical: far below what any sensor of torque or current resolves.
 pub(super) const SILENT: f64 = 1e-9;
 
-/// Squares of means of a residual, of unrest, and of both with each other.
+/// Sums of squared mean residuals, of squared unrest, and of their products.
 #[derive(Debug, Clone, Copy, Default)]
 struct Seen {
     count: f64,
@@ -47,7 +49,7 @@ impl Seen {
         self
     }
 
-    /// The share of squared unrest that adds to the mean square, by least squares.
+    /// Returns the share of the squared unrest that adds to the mean square, by least squares.
     fn unrest_adds(&self) -> f64 {
         let with = self.both - self.square * self.unrest / self.count.max(1.0);
         let alone = self.unrest_twice - self.unrest * self.unrest / self.count.max(1.0);
@@ -56,15 +58,15 @@ impl Seen {
         found.clamp(0.0, most)
     }
 
-    /// Mean square without what unrest adds.
+    /// Returns the mean square without the contribution of unrest.
     fn quiet(&self, adds: f64) -> f64 {
         (self.square - adds * self.unrest).max(QUIET * self.square) / self.count.max(1.0)
     }
 }
 
 impl LearntWindow {
-    /// From what was `seen` of each joint by class of speed; a class counts in full where it was seen more often than `prior`. Unrest is told of if
-    /// there was `enough`.
+    /// Estimates the noise from what was `seen` of each joint by speed class. The overall noise of a joint has the
+    /// weight of `prior` samples. Unrest contributes only if there was `enough` data.
     fn of(joints: &[[Seen; BINS]], prior: f64, enough: bool) -> Self {
         let n = joints.len();
         let (mut noise, mut unquiet) = (Vec::with_capacity(n), Vec::with_capacity(n));
@@ -88,7 +90,8 @@ impl LearntWindow {
     }
 }
 
-/// Root mean square of the means by window, joint and class of speed, and what unrest adds to it, from `free_s` of contact-free time.
+/// Learns the root mean square of the means by window, joint and speed class, and the contribution of unrest, from
+/// `free_s` of contact-free time.
 pub(super) fn learn(
     joints: &[LearntJoint],
     all: &[Piece<'_>],
@@ -110,7 +113,7 @@ pub(super) fn learn(
             for (w, seen) in seen.iter_mut().enumerate() {
                 for (j, (seen, joint)) in seen.iter_mut().zip(joints).enumerate() {
                     let square = means.mean(w, j).powi(2) + means.doubt(j).powi(2);
-                    // A clock that was set back within a piece leaves means that are no numbers.
+                    // After a clock is set back within a piece, the means can be NaN or infinite.
                     if !square.is_finite() {
                         continue;
                     }

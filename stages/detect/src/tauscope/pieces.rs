@@ -1,4 +1,4 @@
-//! What is learnt from: stretches of recordings, and what in them nothing touched.
+//! Stretches of recordings to learn from, and the contact-free samples in them.
 
 use tauscope_bus::{JointArray, TwinState, flags};
 
@@ -6,16 +6,16 @@ use super::late::LateIn;
 use super::spans::Follow;
 use crate::frame::{Lesson, Lessons};
 
-/// So much before a labelled contact is left out \[ns\].
+/// Time before a labelled contact that is left out \[ns\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const BEFORE_NS: i64 = 50_000_000;
-/// So much behind it is left out, too \[ns\].
+/// Time after a labelled contact that is left out \[ns\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const AFTER_NS: i64 = 400_000_000;
-/// Data is cut in at least so many pieces, so that there are some for each part that is held out.
+/// Minimum number of pieces into which the data is divided, so that each fold has some.
 /// Statistical: two for each of the [`FOLDS`].
 const LEAST_PIECES: usize = 8;
-/// In how many parts data is held out from what its noise is learnt from.
+/// Number of cross-validation folds.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 pub(super) const FOLDS: usize = 4;
 
@@ -23,14 +23,15 @@ pub(super) const FOLDS: usize = 4;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Piece<'a> {
     pub samples: &'a [TwinState],
-    /// What the twin misses of each because its acceleration comes late, by joint \[effort unit\].
+    /// Inertial effort that the twin lacks in each sample, by joint \[effort unit\].
     late: &'a [JointArray],
-    /// The part of the data that it is held out with: pieces of one recording together, where there are enough recordings.
+    /// Cross-validation fold. With enough recordings, all pieces of a recording are in the same fold.
     pub fold: usize,
     lesson: &'a Lesson,
 }
 
-/// All recordings; few ones in equal pieces, so that there are some for each fold, unless each must begin where it does.
+/// Returns all recordings. A few recordings are divided into equal pieces, so that each fold has some, unless an
+/// offset is taken from the first seconds of each recording.
 pub(super) fn pieces<'a>(
     lessons: &Lessons<'a>,
     late: &'a LateIn,
@@ -67,7 +68,8 @@ pub(super) fn pieces<'a>(
         .collect()
 }
 
-/// Settled samples of a piece, what the twin misses of each, and whether nothing touched the robot then.
+/// Returns the settled samples of a piece, with the inertial effort that the twin lacks in them and whether they are
+/// contact-free.
 pub(super) fn marked<'a>(
     piece: &Piece<'a>,
 ) -> impl Iterator<Item = (&'a TwinState, &'a JointArray, bool)> {
@@ -92,7 +94,7 @@ pub(super) fn free<'a>(piece: &Piece<'a>) -> impl Iterator<Item = &'a TwinState>
     marked(piece).filter_map(|(sample, _, is_free)| is_free.then_some(sample))
 }
 
-/// How long nothing touched the robot \[s\].
+/// Returns the contact-free time \[s\].
 pub(super) fn free_s(all: &[Piece<'_>]) -> f64 {
     let of_piece = |piece: &Piece<'_>| {
         let mut stamps = piece.samples.iter().map(|sample| sample.header.stamp_ns);
@@ -103,7 +105,7 @@ pub(super) fn free_s(all: &[Piece<'_>]) -> f64 {
     all.iter().map(of_piece).sum()
 }
 
-/// The value below which a share of all is; 0 of none.
+/// Returns a quantile of the values; 0 if there are none.
 pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let last = values.len().saturating_sub(1);

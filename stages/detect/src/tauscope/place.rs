@@ -1,11 +1,12 @@
-//! Which link was touched, where, and how hard.
+//! Isolation of a contact: the touched link, the point and the force.
 //!
-//! A force F at a point loads the joints with Jᵀ F, J the point's Jacobian: the residual is minus that. A hand may touch a link
-//! anywhere along it and around it, from any side. For each of such points the residual's likelihood is had in closed form, with F
-//! normal with a standard deviation of [`HAND_N`] in each direction; the mean over a link's points is the evidence for the link
-//! (`MacKay`, "Information Theory, Inference and Learning Algorithms", 2003, chapter 28): a link does not win by having many
-//! ways to explain what it was not touched for. Evidence is summed over the whole contact, from its first sample to the last whose
-//! score reaches the threshold.
+//! A force F at a point loads the joints with Jᵀ F, where J is the point's Jacobian: the residual is minus that. A
+//! person may touch a link anywhere along it and around it, from any side. For each of a set of points, the
+//! likelihood of the residual has a closed form if each component of F is normal with the standard deviation
+//! [`HAND_N`]. The mean over a link's points is the evidence for the link (`MacKay`, "Information Theory, Inference
+//! and Learning Algorithms", 2003, chapter 28). So a link gains nothing from merely having many points, of which one
+//! explains the residual by chance. The evidence is summed over the whole contact, from its first sample to the last
+//! whose score reaches the threshold.
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
@@ -15,62 +16,63 @@ use super::spans::{SHORTEST, WINDOWS_S};
 use super::windows::Windows;
 use crate::frame::{Contact, LoadedJoints, Seen, Setup};
 
-/// How hard robots are touched \[N\].
+/// Standard deviation of each component of a contact force \[N\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const HAND_N: f64 = 10.0;
-/// The twin is believed to this share of the residual: a strong force is told no better than that.
+/// Model error of the twin, as a share of the residual. It limits the precision for strong forces.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const MODEL_ERROR: f64 = 0.05;
-/// Correlation time of the residual's error: samples closer than that, or than the window that they are the mean of, count as one \[s\].
+/// Correlation time of the residual's error \[s\]. Samples closer than this, or closer than the window that they are
+/// averaged over, count as one.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CORRELATED_S: f64 = 0.1;
-/// So often it is asked anew where the contact is \[ns\].
+/// Interval between two isolations of a contact \[ns\].
 /// Tuned: for what it costs in time; not swept.
 const EVERY_NS: i64 = 8_000_000;
-/// A link is told alone if it is at least this probable; otherwise the next one is told with it.
-/// Tuned: on seed 841 of `tests/contacts/paths.py`, swept over 0.8, 0.9 and 0.95: of the contacts told at one link alone
-/// 87, 88 and 87 % were there.
+/// Probability from which a link is reported alone; below it, the next most probable link is reported, too.
+/// Tuned: on seed 841 of `tests/contacts/paths.py`, swept over 0.8, 0.9 and 0.95: of the contacts reported at one
+/// link alone, 87, 88 and 87 % were there.
 const SURE: f64 = 0.9;
-/// The force on the tool that explains the residual best, and how the touched point moves. World frame.
+/// Force on the tool that explains the residual best, and velocity of the touched point, in the world frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ToolTouch {
     pub force_n: Vector3<f64>,
     pub velocity_m_per_s: Vector3<f64>,
-    /// How much of the residual it explains, of 1.
+    /// Share of the squared residual that the force explains, at most 1.
     pub share: f64,
 }
 
-/// Finds contacts on one robot. No allocation per call.
+/// Locates contacts on one robot. No allocation per call.
 #[derive(Debug)]
 pub(crate) struct Place {
     points: Option<Points>,
     effort_per_nm: Vec<f64>,
-    /// Logarithms of the evidence by joint that carries the link, and what it has been gathered over \[correlation times\].
+    /// Log evidence by joint that carries the link, and the duration over which it was summed \[correlation times\].
     evidence: JointArray,
     gathered: f64,
     loaded: LoadedJoints,
-    /// When it was asked last, and what came of it.
+    /// Time and result of the newest isolation.
     newest: Option<(i64, Contact)>,
 }
 
-/// A residual in units of its noise, as equations for a force.
+/// A residual in units of its noise, as normal equations for a force.
 struct Load {
     joints: usize,
-    /// A force's information between two joints, and what the residual pulls at one.
+    /// Information matrix of the joint torques, and right-hand side of the equations.
     weights: [[f64; MAX_JOINTS]; MAX_JOINTS],
     pull: JointArray,
-    /// The residual's squared length.
+    /// Squared Mahalanobis length of the residual.
     total: f64,
 }
 
-/// The same for forces and torques at a link's origin.
+/// Normal equations for a force and a torque at a link's origin.
 struct Wrench {
     information: Matrix6<f64>,
     pull: Vector6<f64>,
 }
 
 impl Load {
-    /// Of a mean `residual` over a window.
+    /// Sets up the equations for a mean `residual` over a window.
     fn new(residual: &JointArray, windows: &Windows, window: usize, effort_per_nm: &[f64]) -> Self {
         let n = windows.joints();
         let inverse = windows.inverse_correlation(window);
@@ -78,7 +80,7 @@ impl Load {
         for j in 0..n {
             let mean = residual[j];
             let noise = windows.noise(window, j).hypot(MODEL_ERROR * mean);
-            // residual = -Jᵀ F; a joint that tells no torque says nothing of a force.
+            // residual = -Jᵀ F. A joint whose effort gives no torque holds no information about the force.
             if effort_per_nm[j].is_finite() {
                 z[j] = mean / noise;
                 scale[j] = -effort_per_nm[j] / noise;
@@ -101,7 +103,8 @@ impl Load {
         load
     }
 
-    /// For a link whose frame moves with `columns`: of each joint the linear and the angular velocity.
+    /// Transforms the equations to a link whose frame moves with `columns`: by joint, the linear and the angular
+    /// velocity.
     fn at(&self, columns: &[Vector6<f64>; MAX_JOINTS]) -> Wrench {
         let (mut information, mut pull) = (Matrix6::zeros(), Vector6::zeros());
         for a in 0..self.joints {
@@ -121,7 +124,7 @@ impl Load {
 }
 
 impl Wrench {
-    /// Information and pull of a force that acts at `arm` from the link's origin.
+    /// Returns information matrix and right-hand side for a force that acts at `arm` from the link's origin.
     fn force_at(&self, arm: &Vector3<f64>) -> (Matrix3<f64>, Vector3<f64>) {
         // The point moves with linear + angular × arm.
         let cross = arm.cross_matrix();
@@ -133,7 +136,7 @@ impl Wrench {
     }
 }
 
-/// The most probable force, and the logarithm of the evidence for its point beside that for no force at all.
+/// Returns the most probable force, and the log evidence for a force at its point relative to no force at all.
 fn most_probable(information: &Matrix3<f64>, pull: &Vector3<f64>) -> (Vector3<f64>, f64) {
     let scaled = information * HAND_N.powi(2) + Matrix3::identity();
     let Some(inverse) = scaled.try_inverse() else {
@@ -144,7 +147,8 @@ fn most_probable(information: &Matrix3<f64>, pull: &Vector3<f64>) -> (Vector3<f6
     (force, evidence)
 }
 
-/// Mean over weights whose logarithms are given, with the logarithm of their sum.
+/// Returns the weighted mean of the values, and the logarithm of the sum of the weights. `logs` are the logarithms of
+/// the weights.
 fn weighted<const N: usize>(
     logs: &[f64],
     values: &[[Vector3<f64>; N]],
@@ -165,7 +169,7 @@ fn weighted<const N: usize>(
     (mean, largest + sum.ln())
 }
 
-/// The one with the largest logarithm of a probability, and the next one if the first is not [`SURE`].
+/// Returns the entry with the largest log probability, and the next one if the first is less probable than [`SURE`].
 fn most_likely(logs: &[f64]) -> Option<(usize, Option<usize>)> {
     let most = |without: Option<usize>| {
         let others = (logs.iter().enumerate()).filter(|(at, _)| Some(*at) != without);
@@ -191,7 +195,7 @@ impl Place {
         }
     }
 
-    /// Begins another contact.
+    /// Starts another contact.
     pub fn begin(&mut self) {
         self.evidence = [0.0; MAX_JOINTS];
         self.gathered = 0.0;
@@ -199,8 +203,8 @@ impl Place {
         self.newest = None;
     }
 
-    /// Returns joints, link and force of the contact that began at `contact_ns`. To be called with each of its samples. Those with a
-    /// score below the `threshold` do not change joints and link.
+    /// Returns joints, link and force of the contact that began at `contact_ns`. To be called with each of its
+    /// samples. Samples with a score below the `threshold` do not change joints and link.
     pub fn see(
         &mut self,
         sample: &TwinState,
@@ -221,8 +225,8 @@ impl Place {
         }
     }
 
-    /// The link for which there is most evidence since the contact began, and the mean of the forces that a sample allows which is no
-    /// older than [`EVERY_NS`]. The evidence of the sample is added if it `counts`.
+    /// Returns the link with the largest evidence since the contact began, and the mean force. Both are from an
+    /// isolation that is no older than [`EVERY_NS`]. The evidence of the sample is added if it `counts`.
     fn locate(
         &mut self,
         sample: &TwinState,
@@ -270,7 +274,7 @@ impl Place {
             self.evidence[joint] += share * (evidence - weights.ln());
             (links[joint], means[joint]) = (Some(link.link), mean);
         });
-        // What was gathered in less than a correlation time counts as much as one sample does.
+        // Evidence from less than a correlation time has the weight of one independent sample.
         let scale = self.gathered.recip().max(1.0);
         let logs: JointArray = std::array::from_fn(|joint| match links[joint] {
             Some(_) => self.evidence[joint] * scale,
@@ -288,7 +292,8 @@ impl Place {
         Some(contact)
     }
 
-    /// What a force on the tool has to do with the residual's `rise` \[effort unit\]; the joints' `velocity` \[rad/s\] is that before it rose.
+    /// Returns the force on the tool that explains the residual's `rise` best \[effort unit\]. `velocity` is that of
+    /// the joints before the rise \[rad/s\].
     pub fn on_tool(
         &mut self,
         sample: &TwinState,
@@ -319,12 +324,12 @@ impl Place {
         touch
     }
 
-    /// By joint, how much the measured effort changes by 1 N m \[effort unit\].
+    /// Returns, by joint, the change of the measured effort per torque \[effort unit per N m\].
     pub fn effort_per_nm(&self) -> &[f64] {
         &self.effort_per_nm
     }
 
-    /// The points of the robot that are asked about; nothing where the robot or its efforts are not known.
+    /// Returns the evaluated points of the robot; `None` without a model.
     pub fn into_points(self) -> Option<Points> {
         self.points
     }

@@ -1,4 +1,4 @@
-//! Where a robot may be touched.
+//! Points at which a robot may be touched.
 
 use std::f64::consts::TAU;
 
@@ -8,52 +8,54 @@ use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian, link_pos
 
 use crate::frame::{JointSetup, Setup};
 
-/// Where along a link points are asked about, as shares of the way from its joint to the next; and about its centre of mass.
+/// Positions of the evaluated points along a link, as shares of the way from its joint to the next one. Further
+/// points are around its centre of mass.
 /// Tuned: few points for what they cost in time; not swept.
 const ALONG: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
-/// How many around it.
+/// Number of points around the link at each position.
 /// Tuned: few points for what they cost in time; not swept.
 const AROUND: usize = 6;
-/// How far from its axis: between its axis and its surface \[m\].
+/// Distance of these points from the link's axis: between axis and surface \[m\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const RADIUS_M: f64 = 0.03;
-/// A link shorter than this has no axis of its own \[m\].
+/// Length below which a link has no axis of its own \[m\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SHORT_M: f64 = 0.02;
-/// Points of a link.
+/// Number of points of a link.
 pub(crate) const POINTS: usize = (ALONG.len() + 1) * AROUND + 1;
 
-/// A robot's links, by the kinematic tree. No allocation per call.
+/// Links of a robot, from its kinematic tree. No allocation per call.
 ///
-/// Asked about are the links whose own joint tells a torque: no residual parts another one, such as a gripper's finger, from the
-/// link that carries it.
+/// A link is evaluated only if the effort of its own joint gives a torque. No residual distinguishes another link,
+/// such as a gripper's finger, from the link that carries it.
 #[derive(Debug)]
 pub(crate) struct Points {
     robot: (Model, Data),
-    /// The joints whose links are asked about, with where these links end.
+    /// Joints whose links are evaluated, with the ends of these links.
     ends: Vec<(usize, End)>,
-    /// Of them, the one that carries the tool.
+    /// The one of these joints that carries the tool.
     tool_joint: Option<usize>,
 }
 
-/// Where a link ends.
+/// End of a link.
 #[derive(Debug, Clone, Copy)]
 enum End {
-    /// At the joint that carries this link.
+    /// The joint that carries this next link.
     NextLink(usize),
-    /// Where the tool is touched: its link, and the point in its frame.
+    /// The contact point of the tool: the tool's link, and the point in its frame.
     Tool(usize, Vector3<f64>),
-    /// Nobody knows: the centre of mass stands for it.
+    /// Unknown; the centre of mass is used instead.
     CentreOfMass,
 }
 
-/// The movable joints above `joint`, the one next to it first.
+/// Iterates over the movable joints between `joint` and the base, the one next to `joint` first.
 fn towards_base(model: &Model, joint: usize) -> impl Iterator<Item = usize> + '_ {
     let above = |joint: usize| model.links()[model.joints()[joint].parent_link].joint;
     std::iter::successors(above(joint), move |&joint| above(joint))
 }
 
-/// The joint on which most others hang, of those next to `joint` on the way from the base; none where there are none, or several alike.
+/// Returns the child of `joint` that carries most joints; `None` if there is no child, or several of them carry
+/// equally many.
 fn next_joint(model: &Model, joint: usize) -> Option<usize> {
     let above = |other: usize, joint: usize| towards_base(model, other).any(|j| j == joint);
     let carried = |by: usize| (0..model.dof()).filter(|&other| above(other, by)).count();
@@ -64,39 +66,40 @@ fn next_joint(model: &Model, joint: usize) -> Option<usize> {
     longest.next().filter(|_| longest.next().is_none())
 }
 
-/// A link as it is at one sample, world frame.
+/// Pose and motion of a link at one sample, in the world frame.
 pub(crate) struct LinkAt {
     /// Index into the model's links.
     pub link: usize,
     pub origin_m: Vector3<f64>,
-    /// From the origin to the centre of mass and to the next joint, or to the point of the tool that is touched.
+    /// Vectors from the origin to the centre of mass, and to the next joint or the contact point of the tool.
     pub com_m: Vector3<f64>,
     pub end_m: Vector3<f64>,
-    /// Whether it ends at the point of the tool.
+    /// Whether it ends at the contact point of the tool.
     has_tool: bool,
-    /// The axis of the joint that carries it.
+    /// Axis of the joint that carries it.
     axis: Vector3<f64>,
-    /// How the origin moves, and how the link turns, by 1 rad/s of each joint.
+    /// Jacobian by joint: linear velocity of the origin and angular velocity of the link at 1 rad/s of the joint.
     pub columns: [Vector6<f64>; MAX_JOINTS],
 }
 
 impl LinkAt {
-    /// How a point moves by 1 rad/s of a joint; also what 1 N at it along the world's axes loads the joint with \[N m\].
+    /// Returns the velocity of a point at 1 rad/s of a joint. It equals the torque on the joint from 1 N at the point
+    /// along each world axis \[N m\].
     pub fn moved(&self, joint: usize, arm: &Vector3<f64>) -> Vector3<f64> {
         let column = &self.columns[joint];
         let angular = column.fixed_rows::<3>(3);
         column.fixed_rows::<3>(0) + angular.cross(arm)
     }
 
-    /// Points along and around the link and at its end, from its origin \[m\], with their weights: the tool is touched where it is
-    /// meant to be as often as anywhere else on the link that carries it.
+    /// Returns points along and around the link and at its end, from its origin \[m\], with their weights. The
+    /// contact point of the tool weighs as much as all other points of the link that carries the tool.
     pub fn around(&self) -> impl Iterator<Item = (Vector3<f64>, f64)> + '_ {
         let axis = if self.end_m.norm() < SHORT_M {
             self.axis
         } else {
             self.end_m.normalize()
         };
-        // The world's axis that is most across it.
+        // The world axis that is most nearly perpendicular to it.
         let least = axis.map(f64::abs).imin();
         let across = axis.cross(&Vector3::ith(least, 1.0)).normalize();
         let other = axis.cross(&across);
@@ -121,7 +124,7 @@ impl LinkAt {
 }
 
 impl Points {
-    /// Of the cell's robot; nothing without a model.
+    /// Creates the points of the cell's robot; `None` without a model.
     pub fn new(setup: &Setup) -> Option<Self> {
         let model = setup.model.clone()?;
         let tells = |joint: usize| {
@@ -169,12 +172,12 @@ impl Points {
         })
     }
 
-    /// The joint that carries the tool, of those that tell a torque.
+    /// Returns the joint that carries the tool, among those whose effort gives a torque.
     pub fn tool_joint(&self) -> Option<usize> {
         self.tool_joint
     }
 
-    /// Calls `visit` with each joint that tells a torque and the link that it carries.
+    /// Calls `visit` with each joint whose effort gives a torque, and the link that it carries.
     pub fn each_link(&mut self, sample: &TwinState, mut visit: impl FnMut(usize, &LinkAt)) {
         let (model, data) = &mut self.robot;
         let n = model.dof().min(MAX_JOINTS);
@@ -207,7 +210,7 @@ impl Points {
                     com_m,
                     end_m: end - origin_m,
                     has_tool,
-                    // A joint that slides has none; then any will do.
+                    // A prismatic joint has no axis of rotation: any axis will do.
                     axis: turn.try_normalize(1e-9).unwrap_or_else(Vector3::z),
                     columns,
                 },
@@ -215,7 +218,7 @@ impl Points {
         }
     }
 
-    /// The name of a link.
+    /// Returns the name of a link.
     pub fn link_name(&self, link: usize) -> &str {
         &self.robot.0.links()[link].name
     }

@@ -1,35 +1,35 @@
-//! What friction may hold behind a contact, while the arm returns to its path.
+//! Residual that static friction may hold after a contact, while the arm returns to its path.
 //!
-//! A contact moves a joint that stands out of its place. Its controller creeps it back, and static friction holds up
-//! to its bound against that, for seconds where the controller has an integral part. Contact-free recordings show little
-//! of this friction: a joint that a program stops comes to rest in the same way each time. So once most of a contact
-//! has gone, the residual of a joint that stands says less for a while: the larger the contact was, the less. A contact
-//! that goes on is not doubted.
+//! A contact displaces a stationary joint. Its controller slowly moves the joint back. Static friction resists this
+//! up to its bound, for seconds if the controller has an integral part. Contact-free recordings show little of this
+//! friction: a joint that a program stops comes to rest in the same way each time. So once most of a contact has
+//! vanished, the noise of a stationary joint is raised for a while, the more the larger the contact was. While the
+//! contact lasts, the noise is not raised.
 
-/// A joint may hold by friction so much of the contact, in units of what is usual.
-/// Tuned: on the practice set of cyclic moves, by `tauscope evaluate set.yaml --out results --detectors tauscope`, with
-/// the sets of paths and assembly beside it. [`HOLDS`] and [`MOST`] at 0.5 and 6 leave 2.2 % of the free time in alarm,
-/// at 1 and 10 0.9 %, without them 8.7 %; every collision is found with all of these.
+/// Share of a contact that static friction in a joint may hold, both as roots of a score.
+/// Tuned: on the practice set of cyclic moves, by `tauscope evaluate set.yaml --out results --detectors tauscope`,
+/// together with the sets of paths and assembly. [`HOLDS`] and [`MOST`] at 0.5 and 6 leave 2.2 % of the free time in
+/// alarm, at 1 and 10 0.9 %, without them 8.7 %; every collision is found with all of these.
 const HOLDS: f64 = 1.0;
-/// But no more than this, however large the contact was: static friction is bounded.
+/// Upper bound of the held part, as a root of a score: static friction is bounded, however large the contact was.
 /// Tuned: as [`HOLDS`].
 const MOST: f64 = 10.0;
-/// How fast that fades \[s\].
+/// Time constant with which the held part decays \[s\].
 /// Tuned: as [`HOLDS`].
 const FADES_S: f64 = 1.5;
-/// A joint that moves faster than this holds nothing by static friction \[rad/s, m/s\].
+/// Speed above which static friction holds nothing \[rad/s, m/s\].
 /// Tuned: the same as where a standing arm is told by; not swept.
 const SLOW: f64 = 0.03;
-/// What is left is forgotten from here on: it would change a noise by a hundredth.
+/// Held part below which the contact is forgotten: it would change a noise by a hundredth.
 /// Resolution: no score changes by more than that.
 const FORGOTTEN: f64 = 0.01;
 
-/// A contact of late, and what friction may hold of it, both in units of what is usual.
+/// A recent contact, and the part of it that static friction may hold, both as roots of a score.
 #[derive(Debug, Default)]
 pub(super) struct Recovery {
     size: f64,
     held: f64,
-    /// The share of the contact that has gone.
+    /// Share of the contact that has vanished.
     gone: f64,
     newest_ns: i64,
 }
@@ -39,7 +39,7 @@ impl Recovery {
         *self = Self::default();
     }
 
-    /// Takes the next instant, with the root of its score as it is without doubt, and whether a contact goes on.
+    /// Takes the next instant, with the root of its score before the noise is raised, and whether there is a contact.
     pub fn step(&mut self, now_ns: i64, size: f64, contact: bool) {
         let dt_s = (now_ns - std::mem::replace(&mut self.newest_ns, now_ns)) as f64 * 1e-9;
         if contact && size > self.size {
@@ -56,12 +56,12 @@ impl Recovery {
         self.gone = (1.0 - size / self.size).max(0.0);
     }
 
-    /// Whether there is any doubt.
+    /// Returns whether the noise of stationary joints is raised.
     pub fn doubts(&self) -> bool {
         self.held * self.gone > 0.0
     }
 
-    /// By how much the noise of a joint is larger that has been as slow as this \[rad/s, m/s\].
+    /// Returns the factor on the noise of a joint whose recent lowest speed is `slow` \[rad/s, m/s\].
     pub fn doubt(&self, slow: f64) -> f64 {
         1.0 + self.held * self.gone * (1.0 - slow / SLOW).max(0.0)
     }
@@ -73,7 +73,7 @@ mod tests {
 
     const MS: i64 = 1_000_000;
 
-    /// A contact of this size that lasts for a second and leaves so much behind it; the doubt of a standing joint then.
+    /// Returns the state after a contact of this size that lasts for a second, and after `wait_ms` with `left` of it.
     fn behind(size: f64, left: f64, wait_ms: i64) -> Recovery {
         let mut recovery = Recovery::default();
         for k in 0..1000 {

@@ -1,11 +1,14 @@
-//! What a standing arm's effort is held against: what it was before it was touched.
+//! Score of a stationary arm: its effort compared with that from before the contact.
 //!
-//! Static friction holds what it likes: where an arm came to rest, what its effort lacks or exceeds is unknown to within all that friction can
-//! hold, but it stays. So while the arm stands, the effort's *change* counts, in units of how much it changes while nothing touches the arm; no twin
-//! is needed for that. An arm that is about to move changes its effort, too, so a change counts once it has been there for a while and the
-//! arm still stands. A touch leaves friction otherwise than it was, and it creeps for seconds: a contact is over where the change has lost most
-//! of what it had along the contact, whatever else has stayed. What it is then is the new rest, and for a while so much of the contact's size
-//! is needed for another one as may be creep.
+//! Where an arm comes to rest, static friction may hold any effort up to its bound. The residual is therefore unknown
+//! to within this bound, but it is constant. So while the arm is stationary, the *change* of the effort counts, in
+//! units of its changes while nothing touches the arm; no twin is needed for this. An arm that is about to move
+//! changes its effort, too. So a change counts once it has lasted for a while and the arm is still stationary.
+//!
+//! A contact leaves static friction in another state, which creeps for seconds. So a contact is over once the change
+//! has lost most of its component along the contact, whatever else remains. The effort at that time is the new
+//! reference. For a while, another contact must then exceed the creep that is to be expected after a contact of that
+//! size.
 
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
 
@@ -17,42 +20,43 @@ use super::stand::{End, Stand};
 use super::sums::Sums;
 use super::tail::{Peaks, Tail};
 
-/// A standing arm is no faster than this: one that is about to move changes its effort, too \[rad/s, m/s\].
+/// Highest speed of a stationary arm \[rad/s, m/s\]: an arm that is about to move changes its effort, too.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SLOW: f64 = 0.03;
-/// A change counts once it has been there for so long to twice as long \[s\].
+/// Time for which a change must last to count: between this and twice as long \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LASTS_S: f64 = 0.075;
-/// Time constant with which the effort at rest is followed while nothing touches the arm \[s\].
+/// Time constant with which the reference effort is followed while nothing touches the arm \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const FOLLOW_S: f64 = 1.0;
-/// So much of a contact may creep behind it.
+/// Amplitude of the creep after a contact, as a share of the contact.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CREEPS: f64 = 0.5;
-/// How fast that fades \[s\].
+/// Time constant with which the creep decays \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const FADES_S: f64 = 1.5;
-/// What a standing arm does is learnt from at least so much of it \[s\].
+/// Minimum duration of standstill to learn from \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEAST_S: f64 = 10.0;
-/// And from at most so many samples.
+/// Maximum number of samples to learn the noise from.
 /// Tuned: for what it costs in time; not swept.
 const MOST_SAMPLES: usize = 20_000;
-/// A joint's noise is what this share of its changes stays below: what an arm does that is about to move is not noise.
+/// Quantile of the size of a joint's changes that is its noise: larger changes come from an arm that is about to
+/// move.
 /// Statistical: one standard deviation of Gaussian noise.
 const WITHIN_NOISE: f64 = 0.683;
-/// The share of contact-free samples whose change stays below the unit of the score.
-/// Statistical: what one of a hundred contact-free samples exceeds is the unit of the score at rest, where samples are few.
+/// Quantile of the squared change over contact-free samples that is the unit of the score.
+/// Statistical: one of a hundred contact-free samples exceeds it; at rest, samples are too few for a higher quantile.
 const USUAL: f64 = 0.99;
 
-/// What has gone is gone, however the rest changes.
+/// Zero recent change for [`End::step`]: whether a contact is over does not depend on the change of what remains.
 const STEADY: JointArray = [0.0; MAX_JOINTS];
 
-/// By window and joint.
+/// Change of the mean effort by window and joint.
 type Changes = [JointArray; WINDOWS_S.len()];
 
 impl LearntRest {
-    /// Root of the largest squared length of the windows' changes, in units of the usual.
+    /// Returns the root of the largest squared length of the windows' changes, in units of [`LearntRest::usual`].
     fn size(&self, changes: &Changes) -> f64 {
         let joints = self.noise[SHORTEST].len();
         let changes = borne_out(changes, WINDOWS_S.len(), joints, |w, j| self.noise[w][j]);
@@ -66,11 +70,11 @@ impl LearntRest {
     }
 }
 
-/// How long what has lasted: the least of late.
+/// Recent minimum of a value.
 #[derive(Debug)]
 struct Lasting {
     begin_ns: i64,
-    /// Since then, and in the stretch before; infinite where there is none.
+    /// Smallest value since then (infinite if there is none), and in the interval before (0 if there is none).
     least: f64,
     before: f64,
 }
@@ -94,12 +98,12 @@ impl Lasting {
     }
 }
 
-/// The effort of a standing arm.
+/// Reference effort of a stationary arm.
 #[derive(Debug)]
 struct Base {
     sums: Sums,
     stand: Stand,
-    /// Mean effort at rest, while the arm stands and that is known.
+    /// Reference effort; `None` while the arm moves or the reference is unknown.
     mean: Option<JointArray>,
     newest_ns: i64,
 }
@@ -120,8 +124,8 @@ impl Base {
         self.mean = None;
     }
 
-    /// Takes the next sample: how the mean effort over each window has changed against that at rest; nothing while the arm moves, or if it came
-    /// to rest when it was not `free` of contacts.
+    /// Takes the next sample, and returns the change of the mean effort over each window from the reference. Returns
+    /// `None` while the arm moves, or if it came to rest when it was not `free` of contacts.
     fn changes(&mut self, sample: &TwinState, joints: usize, free: bool) -> Option<Changes> {
         let now_ns = sample.header.stamp_ns;
         self.sums.push(now_ns, &sample.effort, joints);
@@ -145,7 +149,7 @@ impl Base {
         Some(changes)
     }
 
-    /// What has changed may creep: it is followed, or not.
+    /// Lets the reference follow the effort, which may creep, if `follows`.
     fn follow(&mut self, now_ns: i64, follows: bool) {
         let dt_s = (now_ns - std::mem::replace(&mut self.newest_ns, now_ns)) as f64 * 1e-9;
         let Some(mean) = self.mean.as_mut().filter(|_| follows) else {
@@ -158,13 +162,14 @@ impl Base {
     }
 }
 
-/// Hands out each change of a standing arm that nothing touches, with its stamp and whether it is the first since the arm came to rest.
+/// Calls `visit` with each change of a stationary arm that nothing touches, with its stamp and whether it is the
+/// first since the arm came to rest.
 fn each(all: &[Piece<'_>], joints: usize, mut visit: impl FnMut(i64, bool, &Changes)) {
     for piece in all {
         let mut base = Base::new();
         let mut is_first = true;
         for (sample, _, is_free) in marked(piece) {
-            // What was before a contact is not what is behind it.
+            // The reference from before a contact is not valid after it.
             if sample.header.has(flags::RESET) || !is_free {
                 base.reset();
             }
@@ -179,7 +184,8 @@ fn each(all: &[Piece<'_>], joints: usize, mut visit: impl FnMut(i64, bool, &Chan
     }
 }
 
-/// Learns from contact-free samples, where an arm stands long enough in them; `hold` keeps noise within what can be believed.
+/// Learns from contact-free samples, if the arm is stationary for long enough in them. `hold` shrinks the noise
+/// towards the median.
 pub(super) fn learn(
     joints: usize,
     all: &[Piece<'_>],
@@ -241,24 +247,24 @@ pub(super) fn learn(
     Some(learnt)
 }
 
-/// How unusual a standing arm's effort is.
+/// Detection of contacts with a stationary arm.
 #[derive(Debug)]
 pub(super) struct Rest {
     learnt: LearntRest,
     joints: usize,
-    /// What a score is multiplied by, so that it is exceeded by chance as often as that of a moving arm.
+    /// Factor on the score. With it, chance exceeds the threshold as often as for a moving arm.
     scale: f64,
     threshold: f64,
     base: Base,
     lasting: Lasting,
-    /// The contact that goes on.
+    /// Present contact.
     end: End,
-    /// Size of the contact before, and when it was over.
+    /// Size of the previous contact, and the time at which it ended.
     before: Option<(f64, i64)>,
 }
 
 impl Rest {
-    /// One whose score is as unusual at this `threshold` as there should be false alarms an hour.
+    /// Creates a detection whose score exceeds this `threshold` by chance `per_hour` times an hour.
     pub fn new(learnt: &LearntRest, joints: usize, threshold: f64, per_hour: f64) -> Self {
         Self {
             learnt: learnt.clone(),
@@ -272,7 +278,7 @@ impl Rest {
         }
     }
 
-    /// From now on the threshold is another one.
+    /// Sets another threshold.
     pub fn retune(&mut self, threshold: f64) {
         self.scale *= threshold / self.threshold;
         self.threshold = threshold;
@@ -284,7 +290,7 @@ impl Rest {
         self.before = None;
     }
 
-    /// The contact that goes on is over: what is left is the new rest, and may creep.
+    /// Ends the present contact: the remaining effort is the new reference, and may creep.
     pub fn settle(&mut self) {
         if self.base.mean.is_none() {
             return;
@@ -295,8 +301,8 @@ impl Rest {
         self.base.mean = Some(self.base.sums.means[MIDDLE]);
     }
 
-    /// The score of the next sample; nothing while the arm moves, nor where it came to rest while something touched it. While it is `free` of
-    /// contacts creep is followed.
+    /// Returns the score of the next sample; `None` while the arm moves, or if it came to rest during a contact.
+    /// Creep is followed while the arm is `free` of contacts.
     pub fn score(&mut self, sample: &TwinState, free: bool) -> Option<f64> {
         let now_ns = sample.header.stamp_ns;
         let Some(changes) = self.base.changes(sample, self.joints, free) else {
@@ -322,7 +328,7 @@ impl Rest {
         Some(self.scale * self.lasting.step(now_ns, size).powi(2))
     }
 
-    /// A change in units of noise.
+    /// Returns a change in units of noise.
     fn units(&self, change: &JointArray) -> JointArray {
         let mut units = [0.0; MAX_JOINTS];
         let noise = self.learnt.noise[MIDDLE].iter();

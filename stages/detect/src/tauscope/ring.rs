@@ -1,12 +1,12 @@
-//! Rows of the newest samples.
+//! Ring buffer of the newest samples.
 
 use tauscope_bus::{JointArray, MAX_JOINTS};
 
-/// By joint and sample, a number with its stamp; `CAPACITY` rows are kept. No allocation per sample.
+/// Ring buffer of `CAPACITY` rows, each with a stamp and a number by joint. No allocation per sample.
 #[derive(Debug)]
 pub(crate) struct Ring<const CAPACITY: usize> {
     rows: Vec<(i64, JointArray)>,
-    /// Rows that have come in since the beginning.
+    /// Number of rows pushed since the last reset.
     count: usize,
 }
 
@@ -22,7 +22,7 @@ impl<const CAPACITY: usize> Ring<CAPACITY> {
         self.count = 0;
     }
 
-    /// How many rows have come in.
+    /// Returns the number of rows pushed since the last reset.
     pub fn count(&self) -> usize {
         self.count
     }
@@ -32,7 +32,7 @@ impl<const CAPACITY: usize> Ring<CAPACITY> {
         self.count += 1;
     }
 
-    /// Takes as much from all rows.
+    /// Subtracts `by` from all rows.
     pub fn shift(&mut self, by: &JointArray) {
         for (_, row) in &mut self.rows {
             for (value, by) in row.iter_mut().zip(by) {
@@ -41,22 +41,23 @@ impl<const CAPACITY: usize> Ring<CAPACITY> {
         }
     }
 
-    /// A row by its number; only the newest [`Ring::is_kept`].
+    /// Returns a row by its number; only rows for which [`Ring::is_kept`] holds are valid.
     pub fn row(&self, number: usize) -> &(i64, JointArray) {
         &self.rows[number % CAPACITY]
     }
 
-    /// Whether this row is there, and will be when the next one has come in.
+    /// Returns whether this row is in the buffer, and still will be after the next push.
     pub fn is_kept(&self, number: usize) -> bool {
         self.count - number < CAPACITY
     }
 
-    /// Whether the next row begins a new round.
+    /// Returns whether the next row starts another pass through the buffer.
     pub fn is_round(&self) -> bool {
         self.count.is_multiple_of(CAPACITY)
     }
 
-    /// Mean over the samples from one instant to another, or the sample nearest to them; zeros where nothing is kept.
+    /// Returns the mean over the samples from one instant to another, or else the sample nearest to them; zeros if
+    /// the buffer is empty.
     pub fn mean(&self, from_ns: i64, to_ns: i64) -> JointArray {
         let kept = &self.rows[..self.count.min(CAPACITY)];
         let between = |stamp_ns: &i64| (from_ns..=to_ns).contains(stamp_ns);

@@ -1,4 +1,4 @@
-//! The smallest force that would be found, link by link.
+//! Smallest detectable force, link by link.
 
 use nalgebra::Vector3;
 use tauscope_bus::MAX_JOINTS;
@@ -10,13 +10,13 @@ use super::place::Place;
 use super::spans::Follow;
 use crate::frame::{Lessons, Setup};
 
-/// Of the contact-free samples every so many is a posture that is asked about.
+/// Stride over the contact-free samples: one in this many is an evaluated posture.
 /// Tuned: for what it costs in time; not swept.
 const EVERY: usize = 50;
 
-/// By link, over the postures and speeds of contact-free recordings, the points of the link and the directions of the
-/// world's axes; empty without a model. A link whose joint has no measured effort has no such force: its touch cannot be
-/// distinguished from one of the link that carries it.
+/// Returns, by link, the smallest detectable force over the postures and speeds of contact-free recordings, the
+/// points of the link and the directions of the world's axes; empty without a model. A link whose joint has no
+/// measured effort has no such force: its touch cannot be distinguished from one of the link that carries it.
 pub(crate) fn smallest(
     learnt: &Learnt,
     lessons: &Lessons<'_>,
@@ -37,7 +37,7 @@ pub(crate) fn smallest(
     };
     let w = learnt.windows.len() - 1;
     let n = learnt.joints.len();
-    // By link in order, the score of 1 N.
+    // The scores of a force of 1 N, by link.
     let mut scores: Vec<(usize, Vec<f64>)> = Vec::new();
     let mut count = 0;
     learnt.each(
@@ -79,7 +79,7 @@ pub(crate) fn smallest(
     let points = &points;
     let of_link = |(link, mut scores): (usize, Vec<f64>)| {
         scores.sort_by(f64::total_cmp);
-        // The force that does in this share of the cases: the others' score is below.
+        // The force that is sufficient in this share of the cases; in the others it scores less than 1.
         let force = |share: f64| {
             let at = ((1.0 - share) * (scores.len() - 1) as f64).round() as usize;
             Some(scores[at].max(0.0).sqrt().recip()).filter(|force| *force < FELT_N)
@@ -93,7 +93,7 @@ pub(crate) fn smallest(
     scores.into_iter().map(of_link).collect()
 }
 
-/// By joint, whether its effort is measured: an effort that is the same in all samples is not.
+/// Returns, by joint, whether its effort is measured: an effort that never changes is not.
 fn measured(lessons: &Lessons<'_>) -> [bool; MAX_JOINTS] {
     let all = lessons.train.iter().chain(lessons.validation);
     let mut samples = all.flat_map(|lesson| &lesson.samples);
@@ -109,6 +109,6 @@ fn measured(lessons: &Lessons<'_>) -> [bool; MAX_JOINTS] {
     measured
 }
 
-/// A direction in which even this does not reach a score of 1 is not felt \[N\].
+/// Force above which a direction counts as not sensed \[N\].
 /// Physical: more than any arm of this kind withstands.
 const FELT_N: f64 = 1e4;

@@ -1,20 +1,20 @@
-//! Over which lengths of time the residual is looked at.
+//! Windows over which the residual is averaged.
 
-/// Lengths of the windows \[s\]; the last one is used where it pays.
+/// Lengths of the windows \[s\]; the last window is used only if it reduces the noise enough.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 pub(crate) const WINDOWS_S: [f64; 4] = [0.01, 0.03, 0.1, 0.2];
-/// The window that tells how a contact begins.
+/// Index of the window for the onset of a contact.
 pub(crate) const SHORTEST: usize = 0;
-/// The window that a contact is followed by.
+/// Index of the window with which a contact is followed.
 pub(crate) const MIDDLE: usize = 1;
-/// The window that tells what is usual just now.
+/// Index of the window for the present residual without a contact.
 pub(super) const LONG: usize = 2;
 
-/// How the slow part of a residual is had.
+/// Settings for the slow part of a residual: drift and offset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Follow {
-    /// Time constant \[s\].
+    /// Time constant of the drift \[s\].
     pub drift_s: f64,
-    /// The mean of so much at the beginning \[s\]; 0 for none.
+    /// Duration at the beginning whose mean residual is the offset \[s\]; 0 for no offset.
     pub offset_from_first_s: f64,
 }

@@ -1,28 +1,29 @@
-//! Whether an arm stands, and when a contact with one that stands is over.
+//! Standstill of an arm, and the end of a contact with a stationary arm.
 //!
-//! Static friction lets a standing arm go back to another balance than it had: what is left of the residual says nothing of a contact any more. So where
-//! it has lost most of what the contact was, along the contact, for a while, the contact is over, and what is left is where the arm stands now, until
-//! it moves. A hand that lets go of most of its force and keeps the rest where it is counts as gone.
+//! After a contact, static friction may hold a stationary arm in another equilibrium than before. The remaining
+//! residual then says nothing about a contact any more. So a contact is over once it has lost most of its size, along
+//! its own direction, for a while. The remaining residual is the new zero until the arm moves. A contact also counts
+//! as over if a hand releases most of its force and keeps the rest constant.
 
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
-/// An arm stands once no joint has been further than this from where it was \[rad, m\], nor faster than `slow`.
+/// Largest displacement of a joint at standstill \[rad, m\]. The joint's speed must also stay below `slow`.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const WITHIN: f64 = 0.01;
-/// For so long \[s\].
+/// Time for which both must hold until the arm counts as stationary \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const STANDS_AFTER_S: f64 = 1.5;
-/// A contact is over where less than this share of it is left.
+/// Share of a contact below which it is over.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEFT: f64 = 0.35;
-/// And what is left changes by no more than this share of it.
+/// Largest recent change of the remaining residual for the contact to be over, as a share of the contact.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const STEADY: f64 = 0.05;
-/// For so long \[s\].
+/// Time for which both must hold until the contact is over \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const OVER_AFTER_S: f64 = 0.1;
 
-/// Tells whether the arm stands.
+/// Detects standstill of the arm.
 #[derive(Debug)]
 pub(super) struct Stand {
     slow: f64,
@@ -31,7 +32,7 @@ pub(super) struct Stand {
 }
 
 impl Stand {
-    /// Of an arm whose joints are no faster than `slow` while it stands \[rad/s, m/s\].
+    /// Creates a detection for an arm whose joints are no faster than `slow` at standstill \[rad/s, m/s\].
     pub fn new(slow: f64) -> Self {
         Self {
             slow,
@@ -44,7 +45,7 @@ impl Stand {
         self.since_ns = None;
     }
 
-    /// Takes the next sample; whether the arm stands.
+    /// Takes the next sample and returns whether the arm is stationary.
     pub fn step(&mut self, sample: &TwinState, joints: usize) -> bool {
         let now_ns = sample.header.stamp_ns;
         let away = |(q, at): (&f64, &f64)| (q - at).abs() > WITHIN;
@@ -70,24 +71,25 @@ fn product(a: &JointArray, b: &JointArray) -> f64 {
 /// Follows a contact to its end.
 #[derive(Debug, Default)]
 pub(super) struct End {
-    /// The contact where it was largest, in units of noise; since when it seems to be over.
+    /// Contact at its largest, in units of noise, and the time since which it appears to be over.
     largest: JointArray,
     over_since_ns: Option<i64>,
 }
 
 impl End {
-    /// No contact goes on.
+    /// Forgets the present contact.
     pub fn forget(&mut self) {
         self.largest = [0.0; MAX_JOINTS];
         self.over_since_ns = None;
     }
 
-    /// Squared length of the contact where it was largest.
+    /// Returns the squared length of the contact at its largest.
     pub fn whole(&self) -> f64 {
         product(&self.largest, &self.largest)
     }
 
-    /// Takes what there is of the contact now, and how that has `changed` of late, both in units of noise; whether it is over.
+    /// Takes the present residual of the contact, and its recent change `changed`, both in units of noise. Returns
+    /// whether the contact is over.
     pub fn step(&mut self, now_ns: i64, units: &JointArray, changed: &JointArray) -> bool {
         if product(units, units) > self.whole() {
             self.largest = *units;

@@ -5,7 +5,7 @@ use tauscope_bus::{JointArray, MAX_JOINTS};
 use super::ring::Ring;
 use super::spans::WINDOWS_S;
 
-/// Most samples of a window.
+/// Maximum number of samples of a window.
 /// Physical: holds the longest window, 0.2 s, up to 5 kHz; arms are read at 1 kHz and less.
 const CAPACITY: usize = 1024;
 
@@ -16,13 +16,13 @@ pub(super) struct Sums {
     /// First row of each window.
     tails: [usize; WINDOWS_S.len()],
     totals: [JointArray; WINDOWS_S.len()],
-    /// By window and joint.
+    /// Means by window and joint.
     pub means: [JointArray; WINDOWS_S.len()],
     windows: usize,
 }
 
 impl Sums {
-    /// Over so many windows.
+    /// Creates the sums over the first `windows` windows.
     pub fn new(windows: usize) -> Self {
         Self {
             rows: Ring::new(),
@@ -68,14 +68,14 @@ impl Sums {
                 self.tails[w] += 1;
             }
         }
-        // Rounding is not to add up.
+        // Rounding errors would accumulate: the sums are computed anew once per pass through the buffer.
         if self.rows.is_round() {
             self.sum_anew(n);
         }
         self.divide(n);
     }
 
-    /// Takes as much from all rows.
+    /// Subtracts `by` from all rows.
     pub fn shift(&mut self, by: &JointArray, n: usize) {
         self.rows.shift(by);
         self.sum_anew(n);

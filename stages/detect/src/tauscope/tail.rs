@@ -1,45 +1,47 @@
-//! How often a score exceeds what by chance.
+//! Rate at which a score exceeds a threshold by chance.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Length of the blocks whose largest score counts \[s\].
-/// Statistical: twice the 0.5 s for which what is left of a residual stays, so that blocks are nearly independent.
+/// Length of the blocks whose largest scores are used \[s\].
+/// Statistical: twice the correlation time of 0.5 s of the residual after the baseline is subtracted, so that blocks
+/// are nearly independent.
 pub(super) const BLOCK_S: f64 = 1.0;
-/// Share of the blocks above the level from which the tail is told.
+/// Share of the blocks above the level; the tail is estimated from them.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const ABOVE: f64 = 0.15;
-/// Where too little was seen to tell a tail, its scale as a share of the largest score's root.
+/// Scale of the tail if there are too few blocks to estimate it, as a share of the root of the largest score.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const FEW: f64 = 0.25;
-/// The shape of a tail that is usual.
+/// Prior of the tail's shape.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const USUAL_SHAPE: f64 = 0.1;
-/// The usual shape counts as so many peaks.
+/// Weight of this prior, as a number of peaks.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const USUAL_PEAKS: f64 = 100.0;
-/// No shape is believed that is further from 0.
+/// Largest absolute value of an estimated shape, before the prior is included.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const FOUND: f64 = 0.5;
-/// A mean of peaks is below its lower limit once in ten times: so many standard deviations.
+/// Lower limit of a mean of peaks, in standard deviations: the mean is below it once in ten times.
 /// Statistical: the 90 % quantile of the normal distribution.
 const LIMIT: f64 = 1.28;
 /// Bounds of the tail's shape: 0 is exponential, above 0 the tail is heavier.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SHAPE: [f64; 2] = [0.0, 0.3];
 
-/// The tail of a score's distribution: the square roots of the largest scores of blocks of one second, above a level,
-/// follow a generalised Pareto distribution (Coles, "An Introduction to Statistical Modeling of Extreme Values", 2001, section 4.2).
+/// Tail of a score's distribution. The square roots of the largest scores of blocks of one second, above a level,
+/// follow a generalised Pareto distribution (Coles, "An Introduction to Statistical Modeling of Extreme Values",
+/// 2001, section 4.2).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tail {
-    /// The level, as a square root of a score.
+    /// Level, as a square root of a score.
     pub level: f64,
-    /// Blocks above it an hour.
+    /// Peaks above the level per hour.
     pub per_hour: f64,
-    /// Scale of what is above.
+    /// Scale of the generalised Pareto distribution.
     pub scale: f64,
-    /// Shape of it.
+    /// Shape of the generalised Pareto distribution: 0 is exponential, above 0 the tail is heavier.
     pub shape: f64,
 }
 
@@ -57,17 +59,18 @@ impl Peaks {
         }
     }
 
-    /// By block.
+    /// Returns the largest score of each block.
     pub fn into_blocks(self) -> Vec<f64> {
         self.0.into_iter().map(|(_, peak)| peak).collect()
     }
 }
 
 impl Tail {
-    /// From the largest score of each block, in order of time.
+    /// Fits the tail to the largest score of each block, in order of time.
     ///
-    /// What exceeds the level in blocks one after the other is one peak (Coles 2001, section 5.3.2). Few peaks tell little of a tail: its
-    /// shape is held to what is usual (as Martins and Stedinger 2000 do), and its scale is the upper limit of what such peaks may come from.
+    /// Consecutive blocks above the level are one peak (Coles 2001, section 5.3.2). Few peaks determine a tail
+    /// poorly. So its shape is shrunk towards a prior (as Martins and Stedinger 2000 do), and its scale is an upper
+    /// confidence limit.
     pub(crate) fn new(mut blocks: Vec<f64>) -> Self {
         for score in &mut blocks {
             *score = score.max(0.0).sqrt();
@@ -75,7 +78,7 @@ impl Tail {
         Self::of_roots(&blocks, &mut Vec::with_capacity(blocks.len()))
     }
 
-    /// The same from the roots of these scores, without an allocation where `scratch` has room for them.
+    /// Fits the tail to the square roots of these scores, without an allocation if `scratch` has room for them.
     pub(super) fn of_roots(blocks: &[f64], scratch: &mut Vec<f64>) -> Self {
         let count = blocks.len().max(1);
         scratch.clear();
@@ -115,8 +118,9 @@ impl Tail {
         }
     }
 
-    /// From blocks that are too few to tell a tail: it is taken for exponential above the largest of them, or above what one of a
-    /// thousand samples exceeds (the unit of a score). A wish for false alarms is no more than a guess then.
+    /// Returns the tail for blocks that are too few to estimate one. It is exponential above the largest of them, or
+    /// above the score that one of a thousand samples exceeds (the unit of a score). The rate of false alarms is no
+    /// more than a guess then.
     pub(crate) fn of_few(blocks: &[f64]) -> Self {
         let level = blocks.iter().fold(1.0, |a, b| f64::max(a, *b)).sqrt();
         Self {
@@ -127,7 +131,7 @@ impl Tail {
         }
     }
 
-    /// The score that is exceeded by chance in so many blocks an hour.
+    /// Returns the score that chance exceeds in `per_hour` blocks an hour.
     pub fn threshold(&self, per_hour: f64) -> f64 {
         let ratio = (self.per_hour / per_hour).max(1.0);
         let above = if self.shape < 1e-6 {
@@ -139,7 +143,8 @@ impl Tail {
     }
 }
 
-/// What the mean of so many exponential peaks of scale 1 is below once in ten times (Wilson and Hilferty 1931).
+/// Returns the lower limit that the mean of this number of exponential peaks of scale 1 falls below once in ten times
+/// (Wilson and Hilferty 1931).
 fn lower_limit(peaks: f64) -> f64 {
     let share = (9.0 * peaks).recip();
     (1.0 - share - LIMIT * share.sqrt()).powi(3)

@@ -1,9 +1,13 @@
-//! What of a joint's residual is usual: friction that the twin leaves out, and how late the twin is.
+//! Baseline of a joint's residual: the friction that the twin leaves out, and the lag of the twin.
 //!
-//! A twin of gains and offsets knows no friction, which is most of what is usual in the residual of an arm that moves; and it knows the
-//! motion through a low-pass, so that what it expects comes late where it changes. Both are learnt, linear in features of the joint's velocity and of
-//! the expected effort, where that foretells recordings they were not learnt from, and followed while the arm warms up: each sample turns the weights towards
-//! what it shows (a least mean square step, the features made independent: Sayed, "Fundamentals of Adaptive Filtering", 2003, section 4.4).
+//! A twin that has only gains and offsets does not model friction, which makes up most of the contact-free residual
+//! of a moving arm. It also knows the motion only through a low-pass, so the expected effort lags where it changes.
+//! The baseline models both as linear in features of the joint's velocity and of the expected effort. It is used only
+//! if it predicts recordings that it was not fitted to. It adapts while the arm warms up: each sample corrects the
+//! weights by a least-mean-squares step in decorrelated features (Sayed, "Fundamentals of Adaptive Filtering", 2003,
+//! section 4.4).
+//!
+//! *Unrest* is the recent change that the measured and the expected effort of a joint have in common.
 
 use nalgebra::{SMatrix, SVector};
 use schemars::JsonSchema;
@@ -11,65 +15,68 @@ use serde::{Deserialize, Serialize};
 
 use super::pieces::{FOLDS, Piece, marked, quantile};
 
-/// The features: a constant, viscous friction, Coulomb friction that sets in over these shares of the usual highest speed, and how much the
-/// expected effort has changed.
+/// Number of features: a constant, viscous friction, two Coulomb terms ([`SETS_IN`]), and the recent change of the
+/// expected effort.
 pub(super) const FEATURES: usize = 5;
-/// Coulomb friction sets in over these shares of the usual highest speed.
+/// Transition widths of the smoothed Coulomb friction, as shares of the joint's reference speed.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SETS_IN: [f64; 2] = [0.1, 0.02];
-/// The expected effort has changed since so long ago \[s\].
+/// Time constant of the low-pass against which the change of an effort is measured \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LATE_S: f64 = 0.04;
-/// The weights are believed as if for so long all had been seen to be zero \[s\].
+/// Strength of the zero-mean prior on the weights, as duration of observation \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const PRIOR_S: f64 = 1.0;
-/// They are used where this share of the squared residual is left of recordings they were not learnt from.
+/// Largest share of the squared residual of held-out recordings that may remain for the baseline to be used.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const PAYS: f64 = 0.6;
-/// They are believed to be right to this share of what they say.
+/// Relative uncertainty assigned to the baseline without its constant.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const RIGHT_TO: f64 = 0.1;
-/// The measured effort is smoothed over so long before its changes are told \[s\].
+/// Time constant with which the measured effort is smoothed before its changes are measured \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SMOOTH_S: f64 = 0.005;
-/// For so long a joint is unquiet whose effort has changed \[s\].
+/// Time constant with which the largest recent change of an effort decays \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CALMS_S: f64 = 0.1;
-/// A joint's usual largest change of expected effort: this share of its samples changes less.
+/// Quantile of the change of the expected effort that serves as its reference.
 /// Statistical: a quantile that one sample in twenty may exceed.
 const LIVELY: f64 = 0.95;
-/// What is left of a residual stays for so long: samples closer than that tell the same \[s\].
+/// Correlation time of the residual after the baseline is subtracted \[s\]; samples closer than this are not
+/// independent.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CORRELATED_S: f64 = 0.5;
-/// A sample lasts no longer than this \[s\].
+/// Upper bound of the time step of a sample \[s\].
 /// Tuned: a guard against gaps, five periods of the slowest practice set (100 Hz); not swept.
 const MOST_STEP_S: f64 = 0.05;
 
 type Features = SVector<f64, FEATURES>;
 /// Products of the features and the residual with each other, summed over time.
 type Products = SMatrix<f64, { FEATURES + 1 }, { FEATURES + 1 }>;
-/// The weights of all features but the constant.
+/// Weights of all features except the constant.
 type Weights = SVector<f64, { FEATURES - 1 }>;
 
-/// What of a joint's residual is usual.
+/// Baseline of a joint's residual.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LearntUsual {
-    /// By how much its expected effort changes at most, usually, within 40 ms \[effort unit\].
+    /// Reference change of the expected effort: the 95 % quantile of its change within 40 ms \[effort unit\].
     pub lively: f64,
-    /// What the residual is by feature: 1, v, v / √(v² + 0.1²), v / √(v² + 0.02²) and u, with v the velocity in shares of the usual highest, and u the
-    /// change of expected effort in shares of the usual largest \[effort unit\].
+    /// Weights of the features 1, v, v / √(v² + 0.1²), v / √(v² + 0.02²) and u \[effort unit\]: v is the velocity
+    /// divided by the reference speed, u the change of the expected effort divided by `lively`.
     pub weights: [f64; FEATURES],
-    /// Inverse of the features' mean products with each other, row by row: how fast each is followed, and how little each is known.
+    /// Inverse of the matrix of the features' mean products, row by row. It sets how fast the weights adapt, and how
+    /// uncertain they are.
     pub inverse_products: Vec<f64>,
-    /// How much contact-free time the weights are from \[s\].
+    /// Contact-free time from which the weights were fitted \[s\].
     pub from_s: f64,
 }
 
-/// What stretches of recordings show of a joint, by the part of the data that they are held out with.
+/// [`Products`] of a joint over stretches of recordings, by cross-validation fold.
 type Shown = [Products; FOLDS];
 
-/// Products about each stretch's own means (a residual that drifts between stretches is not friction), and about zero.
+/// Returns the products about each stretch's own means (a residual that drifts between stretches is not friction),
+/// and about zero. Calls `visit` with the size of the expected effort's change at each contact-free sample.
 fn shown(
     all: &[Piece<'_>],
     joint: usize,
@@ -113,7 +120,7 @@ fn fit(centred: &Products) -> Weights {
     inverse.map_or_else(Weights::zeros, |inverse| inverse * with_residual)
 }
 
-/// Squared residual that is left.
+/// Returns the squared residual that remains with these weights, summed over time.
 fn left(centred: &Products, weights: &Weights) -> f64 {
     let all = SVector::<f64, { FEATURES + 1 }>::from_fn(|i, _| match i {
         0 => 0.0,
@@ -124,8 +131,8 @@ fn left(centred: &Products, weights: &Weights) -> f64 {
 }
 
 impl LearntUsual {
-    /// From the contact-free stretches of recordings; nothing where that does not foretell what is held out. The joint's usual highest speed
-    /// is `fast` \[rad/s\].
+    /// Fits the contact-free stretches of recordings; `None` if the fit does not predict the held-out folds. `fast`
+    /// is the joint's reference speed \[rad/s\].
     pub(super) fn new(all: &[Piece<'_>], joint: usize, fast: f64) -> Option<Self> {
         let mut changes = Vec::new();
         shown(all, joint, fast, 1.0, |change| changes.push(change));
@@ -155,24 +162,24 @@ impl LearntUsual {
         })
     }
 
-    /// Goes on from these weights. The constant is that of contact-free recordings: what lies below a residual is another
-    /// one after each start.
+    /// Takes over these weights except the constant, which remains that of the contact-free recordings: the offset of
+    /// the residual differs after each start.
     pub(super) fn go_on(&mut self, weights: [f64; FEATURES]) {
         self.weights[1..].copy_from_slice(&weights[1..]);
     }
 
-    /// Whether it holds what it needs.
+    /// Returns whether all values are present and in range.
     pub(super) fn is_whole(&self) -> bool {
         let products = self.inverse_products.len() == FEATURES * FEATURES;
         products && self.lively > 0.0 && self.from_s > 0.0
     }
 }
 
-/// What a step of so long makes of what is followed; kept, for clocks are often even.
+/// Filter coefficients of one time step. They are cached, because sample clocks are often uniform.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
     dt_s: f64,
-    /// Shares of what is new that are taken over: of an effort that is followed, and of one that is smoothed; and the share of unrest that stays.
+    /// Gains of the low-passes for following and for smoothing an effort, and decay of the largest recent change.
     late: f64,
     smooth: f64,
     stays: f64,
@@ -192,38 +199,38 @@ impl Step {
         self.dt_s
     }
 
-    /// Whether it lasts exactly so long.
+    /// Returns whether the step has exactly this length.
     pub fn lasts(&self, dt_s: f64) -> bool {
         self.dt_s.to_bits() == dt_s.to_bits()
     }
 }
 
-/// What of a joint's residual is usual just now.
+/// Baseline of a joint's residual at the newest sample.
 #[derive(Debug, Clone)]
 pub(super) struct Usual {
     fast: f64,
     lively: f64,
     constant: f64,
     weights: Features,
-    /// How fast each feature is followed; nothing where only the constant is.
+    /// Adaptation gain of the weights; `None` if only the constant adapts.
     pace: Option<SMatrix<f64, FEATURES, FEATURES>>,
-    /// The newest features, and how much of that moves the weights.
+    /// Newest features, and the direction in which they change the weights.
     newest: Features,
     turn: Features,
-    /// So many samples that tell something of their own the weights are from.
+    /// Number of independent samples from which the weights were fitted.
     worth: f64,
     expected: Changes,
     measured: Changes,
-    /// The measured effort, smoothed.
+    /// Smoothed measured effort.
     smooth: f64,
 }
 
-/// How an effort changes.
+/// Recent changes of an effort.
 #[derive(Debug, Clone, Default)]
 struct Changes {
-    /// What it has been of late.
+    /// Low-passed effort.
     late: Option<f64>,
-    /// How much it has changed against that, now, and the most of late.
+    /// Present deviation from it, and the largest recent deviation, which decays.
     now: f64,
     most: f64,
 }
@@ -238,7 +245,7 @@ impl Changes {
 }
 
 impl Usual {
-    /// Of a joint with this usual highest speed \[rad/s\].
+    /// Creates the baseline of a joint with this reference speed \[rad/s\].
     pub fn new(fast: f64, learnt: Option<&LearntUsual>) -> Self {
         let mut weights = Features::zeros();
         if let Some(learnt) = learnt {
@@ -259,12 +266,12 @@ impl Usual {
         }
     }
 
-    /// What each feature weighs now.
+    /// Returns the present weights of the features.
     pub fn weights(&self) -> [f64; FEATURES] {
         self.weights.into()
     }
 
-    /// A recording begins: what lay below the residual is not known any longer; how the joint rubs is.
+    /// Prepares for another recording: resets the offset, which is unknown again, and keeps the friction.
     pub fn reset(&mut self) {
         self.weights[0] = self.constant;
         self.expected = Changes::default();
@@ -287,7 +294,7 @@ impl Usual {
         Features::from([1.0, v, coulomb[0], coulomb[1], late])
     }
 
-    /// The next sample, with its measured and expected effort: what of its residual is usual.
+    /// Takes the velocity and the measured and expected effort of the next sample, and returns its baseline.
     pub fn next(&mut self, step: &Step, velocity: f64, efforts: [f64; 2]) -> f64 {
         self.step(step, efforts);
         let Some(pace) = &self.pace else {
@@ -298,30 +305,30 @@ impl Usual {
         self.weights.dot(&self.newest)
     }
 
-    /// Follows what was `left` of the residual by this share.
+    /// Adapts the weights by this share to what was `left` of the residual.
     pub fn follow(&mut self, left: f64, share: f64) {
         if self.pace.is_none() {
             self.offset(left, share);
             return;
         }
         let own = self.turn.dot(&self.newest);
-        // What is seen seldom is not to be followed at once.
+        // Rare features have a large adaptation gain, so their step is limited.
         let share = share * (FEATURES as f64 / own).min(1.0);
         self.weights += self.turn * (share * left);
     }
 
-    /// Takes what was `left` of the residual for a constant by this share; by how much that changes what is usual.
+    /// Adapts the constant by this share to what was `left` of the residual, and returns the change of the baseline.
     pub fn offset(&mut self, left: f64, share: f64) -> f64 {
         self.weights[0] += share * left;
         share * left
     }
 
-    /// What of it is there because the twin is late.
+    /// Returns the part of the baseline that the lag of the twin causes.
     pub fn late(&self) -> f64 {
         self.weights[FEATURES - 1] * self.newest[FEATURES - 1]
     }
 
-    /// How far what is usual may be wrong \[effort unit\].
+    /// Returns the uncertainty of the baseline \[effort unit\].
     pub fn doubt(&self) -> f64 {
         if self.pace.is_none() {
             return 0.0;
@@ -329,14 +336,16 @@ impl Usual {
         RIGHT_TO * (self.weights.dot(&self.newest) - self.weights[0])
     }
 
-    /// How many times its square the noise is of a sample that is as unlike what was learnt from as this one: what was told of it is itself no
-    /// better known (the variance of a prediction, as of any linear regression).
+    /// Returns the factor on the noise variance. It grows with the distance of the features from the training
+    /// samples, because the baseline is less certain there (the variance of a prediction, as of any linear
+    /// regression).
     pub fn strange(&self) -> f64 {
         1.0 + self.turn.dot(&self.newest) / self.worth
     }
 
-    /// How much both efforts have changed of late \[effort unit\]: the twin is late where the arm is driven. What touches an arm changes one
-    /// of them alone: the measured effort of one that stays on its path, the expected effort of one that gives way.
+    /// Returns the unrest \[effort unit\]. The twin lags where the arm is driven, which changes both efforts. A
+    /// contact changes only one of them: the measured effort if the arm stays on its path, the expected effort if it
+    /// yields.
     pub fn unrest(&self) -> f64 {
         self.expected.most.min(self.measured.most)
     }

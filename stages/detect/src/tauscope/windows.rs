@@ -1,4 +1,4 @@
-//! How unusual the residual's means over windows that end at the newest sample are.
+//! Scores of the mean residual over windows that end at the newest sample.
 
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
@@ -9,59 +9,59 @@ use super::rest::Rest;
 use super::spans::{Follow, LONG, MIDDLE, SHORTEST, WINDOWS_S};
 use super::stand::{End, Stand};
 
-/// A standing arm that is pushed gives way no faster than this \[rad/s, m/s\].
+/// Highest speed at which a stationary arm yields to a push \[rad/s, m/s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SLOW: f64 = 0.1;
-/// What is left behind a contact with a standing arm creeps for so long \[s\].
+/// Time constant and duration of the creep after a contact with a stationary arm \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CREEPS_S: f64 = 1.5;
-/// By so much of the contact.
+/// Amplitude of this creep, as a share of the contact.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CREEPS: f64 = 0.1;
 
-/// How the residual has changed against the contact that goes on: products in the metric of what is usual.
+/// Change of the residual against the present contact, as inner products in the Mahalanobis metric.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Change {
-    /// Of the change with itself.
+    /// Product of the change with itself.
     pub size: f64,
-    /// With the contact as it has been followed.
+    /// Product of the change with the contact as it has been followed.
     pub along: f64,
-    /// Of that with itself.
+    /// Product of that contact with itself.
     pub held: f64,
 }
 
-/// A contact with a standing arm that is over: when, and the root of its score.
+/// A contact with a stationary arm that is over: its end, and the root of its score.
 #[derive(Debug, Clone, Copy)]
 struct Settled {
     at_ns: i64,
     size: f64,
 }
 
-/// Means of the residual, whitened.
+/// Whitened means of the residual.
 #[derive(Debug)]
 pub(crate) struct Windows {
     means: Means,
     learnt: Learnt,
-    /// What is known of a standing arm, if it is heeded.
+    /// Detection of contacts with a stationary arm; `None` if it is not used.
     at_rest: Option<Rest>,
     stand: Stand,
-    /// The contact with a standing arm that goes on, and when one was over.
+    /// Present contact with a stationary arm, and the last one that ended.
     end: End,
     settled: Option<Settled>,
-    /// What friction may hold behind a contact, if it is heeded.
+    /// Residual that static friction may hold after a contact; `None` if it is not considered.
     recovery: Option<Recovery>,
-    /// By joint, how many times larger that makes the noise now.
+    /// By joint, the factor on the noise because of this friction.
     doubt: JointArray,
-    /// By window and joint, the noise at the present speed and unrest.
+    /// By window and joint, the noise at the present speed and unrest \[effort unit\].
     noise: [JointArray; WINDOWS_S.len()],
-    /// By window and joint, the mean residual as far as the newest samples bear it out.
+    /// By window and joint, the mean residual, limited by that of the next shorter window \[effort unit\].
     borne_out: [JointArray; WINDOWS_S.len()],
-    /// Mean residual of the contact that goes on, as it is followed, and of the one below it.
+    /// Mean residual of the present contact, as it is followed, and the mean residual from before it began.
     held: JointArray,
     base: JointArray,
-    /// Mean residual when the score was usual last.
+    /// Mean residual when the score was last too low for a contact.
     rest: JointArray,
-    /// How unusual: the newest score.
+    /// Newest score.
     score: f64,
 }
 
@@ -85,8 +85,9 @@ impl Windows {
         }
     }
 
-    /// From here on contacts are sought, at this `threshold` for so many false alarms an hour. A standing arm is held against what it was before
-    /// it was touched, if that was learnt; and what friction may hold behind a contact is doubted.
+    /// Starts the search for contacts at this `threshold`, chosen for `per_hour` false alarms an hour. If standstill
+    /// was learnt, the effort of a stationary arm is compared with that from before the contact. Residual that static
+    /// friction may hold after a contact counts as noise.
     pub fn seek(&mut self, threshold: f64, per_hour: f64) {
         let rest = self.learnt.rest.as_ref();
         self.at_rest =
@@ -94,14 +95,14 @@ impl Windows {
         self.recovery = Some(Recovery::default());
     }
 
-    /// From now on the threshold is another one.
+    /// Sets another threshold.
     pub fn retune(&mut self, threshold: f64) {
         if let Some(rest) = &mut self.at_rest {
             rest.retune(threshold);
         }
     }
 
-    /// What was learnt, with what has become usual since.
+    /// Returns the learnt state with the present weights of the baseline.
     pub fn learnt(&self) -> Learnt {
         let mut learnt = self.learnt.clone();
         for (joint, weights) in learnt.joints.iter_mut().zip(self.means.usual_weights()) {
@@ -131,7 +132,8 @@ impl Windows {
         self.means.ready()
     }
 
-    /// The score of the next sample, of which the twin misses `late`: the most unusual window's, or that of a standing arm; below `usual`, drift is followed.
+    /// Returns the score of the next sample: the largest of the windows' scores and the score at standstill. `late`
+    /// is the inertial effort that the twin lacks in this sample. Drift is followed where the score is below `usual`.
     pub fn score(&mut self, sample: &TwinState, late: &JointArray, usual: Option<f64>) -> f64 {
         self.means.push(sample, late);
         for (j, joint) in self.learnt.joints.iter().enumerate() {
@@ -157,14 +159,14 @@ impl Windows {
         self.score /= self.creep(now_ns);
         let at_rest = (self.at_rest.as_mut()).and_then(|rest| rest.score(sample, usual.is_some()));
         self.score = at_rest.map_or(self.score, |score| score.max(self.score));
-        // A sample that stands out is no drift, however short it is: one bad reading would be remembered for minutes.
+        // An outlier, however short, is no drift: the baseline would keep one bad reading for minutes.
         if usual.is_some_and(|usual| self.score < usual) {
             self.means.follow();
         }
         self.score
     }
 
-    /// The score of the most unusual window.
+    /// Returns the largest of the windows' scores.
     fn most_unusual(&mut self) -> f64 {
         let windows = self.learnt.windows.len();
         self.borne_out = borne_out(self.means.all(), windows, self.joints(), |w, j| {
@@ -174,7 +176,7 @@ impl Windows {
         scores.fold(0.0, f64::max)
     }
 
-    /// By how much a score is less, for creep behind a contact with a standing arm.
+    /// Returns the divisor of the score that allows for creep after a contact with a stationary arm.
     fn creep(&self, now_ns: i64) -> f64 {
         self.settled.map_or(1.0, |over| {
             let fades = (-((now_ns - over.at_ns) as f64 * 1e-9) / CREEPS_S).exp();
@@ -182,8 +184,8 @@ impl Windows {
         })
     }
 
-    /// Heeds where a standing arm comes to rest behind a contact: to be called with each sample that is judged, `free` of contacts or not. Whether a
-    /// contact is over.
+    /// Detects the end of a contact with a stationary arm, takes the remaining residual as the new zero and returns
+    /// whether a contact has ended. To be called with each judged sample, `free` of contacts or not.
     pub fn settle(&mut self, sample: &TwinState, free: bool) -> bool {
         let now_ns = sample.header.stamp_ns;
         if !self.stand.step(sample, self.joints()) {
@@ -223,12 +225,12 @@ impl Windows {
         true
     }
 
-    /// The newest score.
+    /// Returns the newest score.
     pub fn newest_score(&self) -> f64 {
         self.score
     }
 
-    /// The longest window that holds nothing from before this instant, or the shortest.
+    /// Returns the longest window without samples from before this instant, or else the shortest one.
     pub fn since(&self, instant_ns: i64) -> usize {
         let s = (self.means.newest_ns() - instant_ns) as f64 * 1e-9;
         let windows = &WINDOWS_S[..self.learnt.windows.len()];
@@ -238,7 +240,7 @@ impl Windows {
             .unwrap_or(SHORTEST)
     }
 
-    /// Squared Mahalanobis length of the mean residual over a window, as far as the newest samples bear it out.
+    /// Returns the squared Mahalanobis length of the mean residual over a window, limited by the next shorter window.
     pub fn length(&self, window: usize) -> f64 {
         self.length_of(window, |joint| self.borne_out[window][joint])
     }
@@ -250,7 +252,7 @@ impl Windows {
             *z = mean(j) / self.doubted(window, j);
         }
         let inverse = &self.learnt.windows[window].inverse_correlation;
-        // Symmetric: a row is a column.
+        // The matrix is symmetric: a row is a column.
         let mut products = [0.0; MAX_JOINTS];
         for (column, z) in inverse.chunks_exact(n).zip(&z) {
             for (product, entry) in products.iter_mut().zip(column) {
@@ -260,22 +262,23 @@ impl Windows {
         (0..n).map(|a| z[a] * products[a]).sum()
     }
 
-    /// Mean residual of a joint over a window \[effort unit\].
+    /// Returns the mean residual of a joint over a window \[effort unit\].
     pub fn mean(&self, window: usize, joint: usize) -> f64 {
         self.means.mean(window, joint)
     }
 
-    /// The same less what it was before the contact began, alone or on top of another.
+    /// Returns the mean residual of a joint over a window less its value before the present contact began \[effort
+    /// unit\]. For a contact on top of another, this value includes the other contact.
     pub fn excess(&self, window: usize, joint: usize) -> f64 {
         self.mean(window, joint) - self.base[joint]
     }
 
-    /// Takes the residual for what it is without a contact.
+    /// Takes the present mean residual as that without a contact.
     pub fn rest(&mut self) {
         self.rest = std::array::from_fn(|j| self.mean(LONG, j));
     }
 
-    /// How the mean residual over the shortest window has changed since this instant \[effort unit\].
+    /// Returns the change of the mean residual over the shortest window since this instant \[effort unit\].
     pub fn rise(&self, since_ns: i64) -> JointArray {
         let mut rise = self.means.earlier(since_ns);
         for (j, rise) in rise.iter_mut().enumerate().take(self.joints()) {
@@ -284,30 +287,31 @@ impl Windows {
         rise
     }
 
-    /// Begins to follow a contact, alone or on top of the one that goes on.
+    /// Starts to follow a contact, alone or on top of the present one.
     pub fn begin(&mut self, on_top: bool) {
         self.base = if on_top { self.held } else { self.rest };
         self.held = std::array::from_fn(|j| self.mean(MIDDLE, j));
     }
 
-    /// Follows the contact that goes on by a share of its changes.
+    /// Follows the present contact by this share of its change.
     pub fn hold(&mut self, share: f64) {
         for j in 0..self.joints() {
             self.held[j] += share * (self.mean(MIDDLE, j) - self.held[j]);
         }
     }
 
-    /// Whether the residual is larger than the contact as it has been followed.
+    /// Returns whether the residual is larger than the contact as it has been followed.
     pub fn grows(&self) -> bool {
         self.length(MIDDLE) / self.learnt.windows[MIDDLE].usual >= self.held()
     }
 
-    /// How unusual the contact is as it has been followed.
+    /// Returns the score of the contact as it has been followed.
     pub fn held(&self) -> f64 {
         self.length_of(MIDDLE, |joint| self.held[joint]) / self.learnt.windows[MIDDLE].usual
     }
 
-    /// How unusual the residual's change is against the contact as it has been followed, and how that lies to the contact.
+    /// Returns the size of the residual's change against the contact as it has been followed, and its direction
+    /// relative to that contact.
     pub fn change(&self) -> Change {
         let n = self.joints();
         let (mut change, mut held) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
@@ -330,23 +334,23 @@ impl Windows {
         }
     }
 
-    /// Its usual size at the joint's present speed and unrest \[effort unit\].
+    /// Returns the noise at the joint's present speed and unrest \[effort unit\].
     pub fn noise(&self, window: usize, joint: usize) -> f64 {
         self.noise[window][joint]
     }
 
-    /// The same where what friction may hold behind a contact is taken for noise, too. It says whether there is a contact; where one is and
-    /// whether the arm has come to rest are no matter of it.
+    /// Returns the noise including the residual that static friction may hold after a contact. It serves to detect
+    /// contacts; locating them and finding their end at standstill use [`Windows::noise`].
     fn doubted(&self, window: usize, joint: usize) -> f64 {
         self.noise[window][joint] * self.doubt[joint]
     }
 
-    /// Inverse of the correlation of the joints' means over a window, row by row.
+    /// Returns the inverse of the correlation of the joints' means over a window, row by row.
     pub fn inverse_correlation(&self, window: usize) -> &[f64] {
         &self.learnt.windows[window].inverse_correlation
     }
 
-    /// How many joints there are.
+    /// Returns the number of joints.
     pub fn joints(&self) -> usize {
         self.learnt.joints.len()
     }

@@ -1,18 +1,18 @@
-//! An allocator that counts, for tests of what is allocated per sample.
+//! A counting allocator, for tests of allocations per sample.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use tauscope_bus::{Detection, Emit, LinkError};
 
-/// The system's allocator, counting per thread.
+/// The system's allocator with a counter per thread.
 pub struct Counting;
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
 }
 
-/// How often this thread has allocated so far.
+/// Returns the number of allocations of this thread so far.
 pub fn allocations() -> usize {
     ALLOCATIONS.with(Cell::get)
 }
@@ -21,7 +21,7 @@ fn count() {
     ALLOCATIONS.with(|allocations| allocations.set(allocations.get() + 1));
 }
 
-// SAFETY: every call is passed on to the system's allocator as it came.
+// SAFETY: every call is passed unchanged to the system's allocator.
 #[allow(
     unsafe_code,
     reason = "a global allocator is unsafe by its nature; test only"
@@ -40,7 +40,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// Takes what a stage says and forgets it.
+/// Discards the detections of a stage.
 pub struct Nowhere;
 
 impl Emit<Detection> for Nowhere {

@@ -1,4 +1,4 @@
-//! What the tests of detectors share.
+//! Common parts of the detectors' tests.
 
 #![allow(dead_code, reason = "each test file uses its own part")]
 
@@ -7,7 +7,7 @@ pub mod counting;
 use tauscope_bus::{Detection, Emit, LinkError};
 use tauscope_detect::{JointSetup, Setup};
 
-/// Keeps all that a stage says.
+/// Keeps all detections of a stage.
 #[derive(Default)]
 pub struct Out(pub Vec<Detection>);
 
@@ -20,7 +20,7 @@ impl Emit<Detection> for Out {
     }
 }
 
-/// A cell of so many joints, in N m, of which nothing else is known.
+/// Returns a minimal cell with this number of joints and efforts in N m.
 pub fn setup(joints: usize) -> Setup {
     let joint = JointSetup {
         gain: 1.0,

@@ -1,7 +1,7 @@
-//! Commands that come in over Zenoh, at most so many at a time.
+//! Bounded inbox of commands received over Zenoh.
 //!
-//! A question (`get`) is answered, once a sample has taken the command or it is refused. A message (`put`) is taken all
-//! the same, without an answer.
+//! A query (`get`) is answered once a sample carries the command, or once the command is refused. A message (`put`)
+//! is accepted too, but not answered.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{self, SyncSender};
@@ -17,11 +17,11 @@ use zenoh::{Session, Wait as _};
 use super::Takes;
 use crate::setup::Setup;
 
-/// Commands that wait for a sample at most.
+/// Maximum number of commands that wait for a sample.
 const CAPACITY: usize = 64;
-/// A command that no sample has taken for so long is refused: it must not hold when nobody expects it any more.
+/// Timeout after which a waiting command is refused: it must not take effect when its sender no longer expects it.
 const LONGEST_WAIT: Duration = Duration::from_secs(1);
-/// No request is longer \[bytes\].
+/// Maximum size of a request \[bytes\].
 const MAX_PAYLOAD_BYTES: usize = 4096;
 
 /// A command that waits for a sample.
@@ -34,7 +34,7 @@ pub(super) struct Waiting {
 type Queue = Arc<Mutex<VecDeque<Waiting>>>;
 type Answers = SyncSender<(Query, Answer)>;
 
-/// Where commands come in.
+/// Receiver of commands over Zenoh.
 pub(super) struct Inbox {
     /// Keeps the declarations alive.
     _session: Session,
@@ -56,7 +56,7 @@ impl Inbox {
         };
         let session = endpoints.session()?;
         let queue = Queue::default();
-        // Answering may wait for a slow asker, which samples must not.
+        // Replies have a thread of their own: a slow client blocks them, and samples must not wait for it.
         let (answers, to_answer) = mpsc::sync_channel::<(Query, Answer)>(CAPACITY);
         std::thread::spawn(move || {
             for (question, answer) in to_answer {
@@ -92,7 +92,7 @@ impl Inbox {
         })
     }
 
-    /// The command that has waited longest.
+    /// Removes and returns the command that has waited longest.
     pub fn pop(&mut self) -> Option<Waiting> {
         lock(&self.queue).pop_front()
     }
@@ -121,7 +121,7 @@ impl Inbox {
     }
 }
 
-/// Where Zenoh's threads put requests.
+/// Checks requests, on Zenoh's threads, and puts them into the queue.
 #[derive(Clone)]
 struct Door {
     queue: Queue,
@@ -184,12 +184,12 @@ impl Door {
     }
 }
 
-/// Hands the answer to the thread that gives it; who asked without wanting one finds a refusal in the log.
+/// Passes the answer to the thread that replies; without a query, logs a refusal.
 fn answer_to(answers: &Answers, question: Option<Query>, answer: Answer) {
     match (question, answer) {
         (Some(question), answer) => {
             if answers.try_send((question, answer)).is_err() {
-                tracing::warn!("an answer to a command is lost: those who ask do not take theirs");
+                tracing::warn!("an answer to a command was dropped: its client is too slow");
             }
         }
         (None, Answer::Refused { reason }) => tracing::warn!("a command was refused: {reason}"),
@@ -212,7 +212,7 @@ fn reply(question: &Query, answer: &Answer) {
     }
 }
 
-// No code panics while it holds the lock, so a poisoned one still guards a whole queue.
+// No code panics while it holds the lock, so a poisoned lock still guards a consistent queue.
 fn lock(queue: &Queue) -> MutexGuard<'_, VecDeque<Waiting>> {
     queue.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,4 +1,4 @@
-//! What a pipeline file says of a Universal Robots controller.
+//! Settings of a Universal Robots controller in the pipeline file.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,30 +12,30 @@ pub struct UrRtdeConfig {
     /// TCP port of RTDE.
     #[serde(default = "default_port")]
     pub port: u16,
-    /// Packages a second; a controller that cannot sends fewer: e-Series 500, CB3 125 \[Hz\].
+    /// Packages per second \[Hz\]. The controller limits them: e-Series to 500, CB3 to 125.
     #[serde(default = "default_rate_hz")]
     #[schemars(range(min = 1.0, max = 500.0))]
     pub rate_hz: f64,
     /// The arm's joints from base to wrist, by their names in the URDF; by default the cell's six joints.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joints: Option<Vec<String>>,
-    /// Which of the controller's outputs is the measured effort.
+    /// Output of the controller that is read as the measured effort.
     #[serde(default)]
     pub effort: UrEffort,
-    /// Whether the controller's `target_moment` is read as another twin's effort, for `twin: {expected: topic}`.
+    /// Whether the controller's `target_moment` is read as an external twin's effort, for `twin: {expected: topic}`.
     #[serde(default)]
     pub target_moment: bool,
-    /// Whether the payload that is set on the controller is the attached tool. The cell needs a `tool` with a `link`,
-    /// which is the flange.
+    /// Whether the payload set on the controller is used as the attached tool. Requires a `tool` of the cell whose
+    /// `link` is the flange.
     #[serde(default)]
     pub payload: bool,
-    /// Packages held while the pipeline is busy; the oldest gives way, and is counted.
+    /// Capacity of the queue of received packages. When it is full, the oldest package is dropped and counted.
     #[serde(default = "default_queue")]
     #[schemars(range(min = 1, max = 1_000_000))]
     pub queue: usize,
 }
 
-/// The output of the controller that is the measured effort.
+/// Outputs of the controller that can be read as the measured effort.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum UrEffort {
@@ -44,12 +44,12 @@ pub enum UrEffort {
     ActualCurrent,
     /// Torque from the motor current \[N m\]; newer controllers only.
     ActualCurrentAsTorque,
-    /// What the controller's own model requires \[N m\]; nothing is measured, contacts do not show.
+    /// Torque required by the controller's own model \[N m\]. It is not measured, so contacts do not show.
     TargetMoment,
 }
 
 impl UrEffort {
-    /// Its name in RTDE.
+    /// Returns the name of the output in RTDE.
     pub(crate) fn field(self) -> &'static str {
         match self {
             Self::ActualCurrent => "actual_current",

@@ -1,14 +1,13 @@
-//! The velocity of a motion whose source gives positions only. Causal, so that a replay makes what
-//! the live run made.
+//! Velocities for a source that gives only positions. Causal, so that a replay reproduces the live run.
 
 use tauscope_bus::{JointArray, MAX_JOINTS};
 use tauscope_dynamics::derivative::FilteredDerivative;
 
-/// A longer gap is not bridged.
+/// Longest gap across which positions are differentiated \[ns\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MAX_GAP_NS: i64 = 250_000_000;
-/// Rows that only repeat the row before are no standstill, unless they last this long: many drivers
-/// publish faster than they measure.
+/// Duration from which repeated rows are treated as a standstill \[ns\]. Shorter repetitions are skipped, since many
+/// drivers publish faster than they measure.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MAX_REPEAT_NS: i64 = 50_000_000;
 
@@ -21,11 +20,11 @@ pub(super) struct Differentiator {
     velocity: JointArray,
 }
 
-/// What came of a row.
+/// Result of a row.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Differentiated {
     pub velocity: JointArray,
-    /// The velocity was differentiated and starts anew here, at zero.
+    /// Whether the velocity is differentiated and restarts here, at zero.
     pub restarted: bool,
 }
 
@@ -40,12 +39,12 @@ impl Differentiator {
         }
     }
 
-    /// Forgets all that came before.
+    /// Discards all earlier rows.
     pub fn reset(&mut self) {
         self.last = None;
     }
 
-    /// The velocity at `position`: `given`, where the source gives one.
+    /// Returns the velocity at `position`: `given`, if the source gives one.
     pub fn update(
         &mut self,
         stamp_ns: i64,

@@ -1,8 +1,8 @@
-//! What another topic last said, by stamp.
+//! Newest messages of a side topic, by stamp.
 
 use std::collections::VecDeque;
 
-/// More than a topic can be ahead of the states by.
+/// Maximum number of messages kept; more than a topic gets ahead of the states.
 /// Resolution: memory; about 0.25 s at 1 kHz.
 const CAPACITY: usize = 256;
 
@@ -21,8 +21,7 @@ impl<T> Default for Side<T> {
 }
 
 impl<T> Side<T> {
-    /// Adds a message. One that is older than what is there already makes that void: its publisher
-    /// began anew.
+    /// Adds a message. Drops messages with an equal or later stamp: their publisher has restarted since.
     pub fn push(&mut self, stamp_ns: i64, value: T) {
         while self
             .entries
@@ -37,15 +36,15 @@ impl<T> Side<T> {
         self.entries.push_back((stamp_ns, value));
     }
 
-    /// Whether a message of this instant or later has come, so that [`Side::at`] cannot change.
+    /// Whether a message of this instant or later has arrived, so that [`Side::at`] cannot change.
     pub fn reaches(&self, stamp_ns: i64) -> bool {
         self.entries
             .back()
             .is_some_and(|(newest, _)| *newest >= stamp_ns)
     }
 
-    /// The newest message at or before `stamp_ns`, unless it is older than `max_age_ns`. Forgets what
-    /// came before it.
+    /// Returns the newest message at or before `stamp_ns`, unless it is older than `max_age_ns`. Drops all earlier
+    /// messages.
     pub fn at(&mut self, stamp_ns: i64, max_age_ns: i64) -> Option<&T> {
         while self
             .entries
@@ -60,7 +59,7 @@ impl<T> Side<T> {
             .map(|(_, value)| value)
     }
 
-    /// The clock was set back to `stamp_ns`: what was said later is void.
+    /// Drops the messages after `stamp_ns`, to which the clock was set back.
     pub fn forget_after(&mut self, stamp_ns: i64) {
         self.entries.retain(|(at, _)| *at <= stamp_ns);
     }

@@ -1,4 +1,4 @@
-// What is copied must come out as it went in.
+// Copied values must be identical to the bit.
 #![allow(clippy::float_cmp)]
 
 use tauscope_session::Unusable;
@@ -42,7 +42,7 @@ fn message(stamp_ns: i64, names: &str, position: &[f64]) -> ros::JointState {
     }
 }
 
-/// Gives out all that is packed, late.
+/// Returns all packed samples, as if no command could follow.
 fn drain(packer: &mut Packer) -> Vec<JointState> {
     std::iter::from_fn(|| packer.pop(i64::MAX)).collect()
 }
@@ -90,7 +90,7 @@ fn two_publishers_with_a_part_of_the_arm_each_make_one_state() {
 #[test]
 fn messages_that_lack_a_joint_for_long_are_counted_and_slower_publishers_are_not() {
     let mut packer = packer();
-    // One publisher at 100 Hz, the other at 50: nothing is lost that could be told.
+    // One publisher at 100 Hz, the other at 50: no loss that could be detected.
     for n in 0..100 {
         let at = 10 * MS * n;
         packer.state(&message(at, "a b", &[1.0, 2.0]), at);
@@ -100,7 +100,7 @@ fn messages_that_lack_a_joint_for_long_are_counted_and_slower_publishers_are_not
     }
     assert_eq!(drain(&mut packer).len(), 50);
     assert_eq!(packer.counts().dropped(), 0);
-    // The second ceases for a second, and comes back.
+    // The second publisher is silent for a second, then resumes.
     for n in 100..200 {
         let at = 10 * MS * n;
         packer.state(&message(at, "a b", &[1.0, 2.0]), at);
@@ -108,7 +108,7 @@ fn messages_that_lack_a_joint_for_long_are_counted_and_slower_publishers_are_not
     assert_eq!(packer.counts().parted, 100);
     packer.state(&message(2000 * MS, "a b c", &[1.0, 2.0, 3.0]), 2000 * MS);
     assert_eq!(drain(&mut packer).len(), 1);
-    // The message that came last is part of the new state.
+    // All but the last message, which has all joints, were dropped.
     assert_eq!(packer.counts().dropped(), 101);
 }
 
@@ -132,7 +132,7 @@ fn a_state_with_nan_is_dropped_and_counted() {
     packer.state(&message(1, "a b c", &[1.0, 2.0, 3.0]), 1);
     packer.state(&message(2, "a b c", &[1.0, f64::NAN, 3.0]), 2);
     packer.state(&message(3, "a b c", &[1.0, f64::INFINITY, 3.0]), 3);
-    // Another arm's NaN is not ours.
+    // A NaN of another arm does not count.
     packer.state(&message(4, "a b c x", &[1.0, 2.0, 3.0, f64::NAN]), 4);
     assert_eq!(drain(&mut packer).len(), 2);
     assert_eq!(packer.counts().not_finite, 2);
@@ -156,7 +156,7 @@ fn what_is_refused_is_told_by_joint_and_field_with_count_and_time() {
         packer.state(&state, stamp_ns);
         told.extend(packer.newly_refused(stamp_ns));
     }
-    // A live source says it at once, and what came since at most once a minute.
+    // A live source reports the first one at once, and later ones at most once a minute.
     assert_eq!(told.len(), 2, "{told:?}");
     let first = "the effort of b is NaN in 1 message at 100.000 s. These messages are not used. Check the driver and the sensor";
     assert_eq!(told[0], first);
@@ -177,7 +177,7 @@ fn a_message_that_names_a_joint_twice_is_refused_and_named() {
     assert!(verdict.starts_with(named), "{verdict}");
     assert_eq!(packer.counts().dropped(), 2);
     assert!(packer.refused().unwrap().starts_with(named));
-    // Another arm's joints are not ours.
+    // Joints of another arm do not count.
     packer.state(&message(3, "a x b x c", &[1.0, 8.0, 2.0, 9.0, 3.0]), 3);
     let samples = drain(&mut packer);
     assert_eq!(samples.len(), 1);
@@ -190,7 +190,7 @@ fn a_joint_that_is_nan_throughout_is_named() {
     for stamp in 1..100 {
         let mut state = message(stamp, "a b c", &[1.0, 2.0, 3.0]);
         state.effort[1] = f64::NAN;
-        // Another joint's NaN now and then does not confuse it.
+        // An occasional NaN of another joint does not change the verdict.
         state.position[2] = if stamp % 2 == 0 { f64::NAN } else { 1.0 };
         packer.state(&state, stamp);
     }
@@ -297,7 +297,7 @@ fn a_gap_starts_the_velocity_anew_and_says_so() {
     let resets: Vec<_> = samples.iter().map(|s| s.header.has(flags::RESET)).collect();
     assert_eq!(resets, [false, false, false, true, false]);
     assert_eq!(samples[3].velocity[0], 0.0);
-    // Where the velocity is measured, a gap is the reader's to judge.
+    // With a measured velocity, a gap does not set the flag.
     let mut packer = self::packer();
     for stamp_ms in [1000, 2000] {
         packer.state(&message(stamp_ms * MS, "a b c", &[0.0; 3]), stamp_ms * MS);
@@ -345,18 +345,18 @@ fn a_sample_waits_for_the_command_of_its_instant() {
     packer.command(&message(990 * MS, "a b c", &[0.9, 0.9, 0.9]), 990 * MS);
     packer.state(&message(1000 * MS, "a b c", &[1.0, 2.0, 3.0]), 1000 * MS);
     assert_eq!(packer.pop(1001 * MS), None);
-    // The command of the same stamp comes after the state, and is taken all the same.
+    // The command of the same stamp is used although it arrives after the state.
     packer.command(&message(1000 * MS, "c b a", &[0.3, 0.2, 0.1]), 1002 * MS);
     let sample = packer.pop(1002 * MS).unwrap();
     assert!(sample.header.has(flags::COMMAND | flags::COMMAND_VELOCITY));
     assert_eq!(sample.command_position[..3], [0.1, 0.2, 0.3]);
     assert_eq!(sample.command_velocity[..3], [1.0, 2.0, 3.0]);
-    // One that comes too late is not: the newest before it is.
+    // A command that arrives too late is not used, but the newest one before it.
     packer.state(&message(1010 * MS, "a b c", &[1.0, 2.0, 3.0]), 1010 * MS);
     assert_eq!(packer.pop(1109 * MS), None);
     let sample = packer.pop(1110 * MS).unwrap();
     assert_eq!(sample.command_position[..3], [0.1, 0.2, 0.3]);
-    // And one that is too old belongs to no sample.
+    // A command that is too old is not attached.
     packer.state(&message(1501 * MS, "a b c", &[1.0, 2.0, 3.0]), 1501 * MS);
     let sample = packer.pop(i64::MAX).unwrap();
     assert!(!sample.header.has(flags::COMMAND));
@@ -461,7 +461,7 @@ fn a_request_for_learning_belongs_to_the_next_state_alone() {
     packer.state(&message(1000, "a b c", &[1.0, 2.0, 3.0]), 2000);
     packer.learn(ros::Bool { data: true });
     packer.learn(ros::Bool { data: false });
-    // A repeated state is no sample, and takes nothing away.
+    // A repeated state is no sample, so it does not use up the request.
     packer.state(&message(1000, "a b c", &[1.0, 2.0, 3.0]), 2001);
     packer.state(&message(1002, "a b c", &[1.0, 2.0, 3.0]), 2002);
     packer.state(&message(1003, "a b c", &[1.0, 2.0, 3.0]), 2003);

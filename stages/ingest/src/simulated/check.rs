@@ -1,9 +1,9 @@
-//! What a scenario's numbers must be among themselves and for the robot.
+//! Checks of a scenario's numbers against each other and against the robot.
 
 use super::error::ScenarioError;
 use super::trajectory::JointRange;
 
-/// A position that the robot can take.
+/// Checks that a position is within the robot's limits.
 pub(super) fn position(
     what: &'static str,
     values: &[f64],
@@ -30,7 +30,7 @@ pub(super) fn position(
     Ok(())
 }
 
-/// Smallest and largest of something that is not negative.
+/// Checks that a range of non-negative numbers is in order.
 pub(super) fn order(what: &'static str, [least, most]: [f64; 2]) -> Result<(), ScenarioError> {
     if 0.0 <= least && least <= most && most.is_finite() {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Effects drawn at random: what a simulated cell conceals for somebody to find.
+//! Effects drawn at random, which a simulated cell conceals as the task of an identification.
 
 mod draw;
 mod plan;
@@ -18,28 +18,28 @@ use super::scenario::Scenario;
 use draw::{Candidate, candidate, drawn};
 use plan::Plan;
 
-/// What is drawn changes the effort of some joint by so many times its noise, root mean square over the
-/// instants that it changes: it can be seen, and does not cry out.
+/// Range of the effort change by a drawn effect, in multiples of the joint's effort noise: root mean square over
+/// the instants that it changes. Visible, but not obvious.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const VISIBLE: [f64; 2] = [5.0, 30.0];
-/// Places that are tried for an effect.
+/// Maximum number of places tried for an effect.
 /// Resolution: bounds the computing time; an effect without a place is an error.
 const PLACES: usize = 30;
-/// Halvings of the range of sizes.
+/// Number of bisections of the range of sizes.
 /// Resolution: 2⁻²⁰ of the range.
 const HALVINGS: usize = 20;
 
-/// Effects that are drawn at random and added to the physics. Which, is written to `concealed.json`
-/// alone.
+/// Effects that are drawn at random and added to the physics. Only the file `concealed.json` names
+/// them.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConcealSpec {
-    /// What is drawn follows from this number, and from the robot and the motions.
+    /// Seed of the draw, which also depends on the robot and the motions.
     pub seed: u64,
-    /// Effects to draw from; by default every known one.
+    /// Names of the effects to draw from; by default all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<String>,
-    /// How many are drawn, each a different one; 0 for none.
+    /// Number of effects to draw, all different; 0 for none.
     #[serde(default = "default_count")]
     #[schemars(range(max = 8))]
     pub count: u32,
@@ -49,25 +49,25 @@ fn default_count() -> u32 {
     1
 }
 
-/// What was concealed, as `concealed.json` holds it.
+/// Concealed effects, as written to `concealed.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Concealed {
     /// The effects.
     pub effects: Vec<ConcealedEffect>,
 }
 
-/// One of them.
+/// A concealed effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ConcealedEffect {
     /// The term.
     #[serde(flatten)]
     pub term: TermSpec,
-    /// By how many times its noise it changes the effort of the joint that it changes most: root mean
-    /// square over the instants of the planned motion that it changes.
+    /// Effort change in multiples of the noise, at the joint that it changes most: root mean square over
+    /// the instants of the planned motion that it changes.
     pub times_noise: f64,
 }
 
-/// How many of so many recordings may be fitted; the others are held out.
+/// Returns the number of `recordings` that may be fitted; the others are held out.
 pub fn fit_count(recordings: usize) -> usize {
     match recordings {
         0..=2 => 1,
@@ -75,7 +75,7 @@ pub fn fit_count(recordings: usize) -> usize {
     }
 }
 
-/// The scenario with what it conceals among its physics; as it is if it conceals nothing.
+/// Adds the effects that a scenario conceals to its physics; returns it unchanged if it conceals none.
 pub(super) fn add<'a>(
     scenario: &'a Scenario,
     model: &Model,
@@ -91,7 +91,7 @@ pub(super) fn add<'a>(
     Ok((Cow::Owned(open), Some(concealed)))
 }
 
-/// Whether it is what bodies weigh, for good: one of these at most.
+/// Whether an effect is a permanent mass of a body, of which at most one is drawn.
 fn is_mass(effect: &Effect) -> bool {
     effect.family == Family::Body && effect.lasts()
 }
@@ -114,7 +114,7 @@ fn draw(
         if effects.len() == spec.count as usize {
             break;
         }
-        // What a link weighs more and what the tool carries may be one body.
+        // A surplus mass of a link and an undeclared payload may be the same body.
         if is_mass(effect) && has_mass {
             continue;
         }
@@ -124,7 +124,7 @@ fn draw(
             let Some(candidate) = candidate else {
                 continue;
             };
-            // Two effects in a joint are another riddle, and two transmissions are none.
+            // One effect per joint: two confound each other, and two transmissions cannot be simulated.
             let joint = candidate.term(candidate.sizes()[0]).joint;
             let taken = |term: &TermSpec| term.joint.is_some() && term.joint == joint;
             if effects.iter().any(|other| taken(&other.term)) {
@@ -142,7 +142,7 @@ fn draw(
     if effects.len() < spec.count as usize {
         return Err(ScenarioError::Conceal {
             reason: format!(
-                "only {} of {} effects can be seen in these motions without more than the motors have",
+                "only {} of {} effects are visible in these motions within the motors' limits",
                 effects.len(),
                 spec.count
             ),
@@ -151,7 +151,7 @@ fn draw(
     Ok(Concealed { effects })
 }
 
-/// The effects to draw from.
+/// Returns the effects to draw from.
 fn to_draw_from(spec: &ConcealSpec) -> Result<Vec<&'static Effect>, ScenarioError> {
     let refuse = |reason| Err(ScenarioError::Conceal { reason });
     let mut effects: Vec<&'static Effect> = Vec::new();
@@ -181,7 +181,7 @@ fn to_draw_from(spec: &ConcealSpec) -> Result<Vec<&'static Effect>, ScenarioErro
     Ok(effects)
 }
 
-/// The candidate at the size that is seen as well as `target` asks, if there is one.
+/// Returns the candidate at the size whose multiple of the noise is `target`, if there is one.
 fn sized(
     candidate: &Candidate,
     target: f64,
@@ -210,7 +210,7 @@ fn sized(
     }))
 }
 
-/// A random number, any ratio as likely as any other.
+/// Returns a random number whose logarithm is uniformly distributed.
 fn log_between([least, most]: [f64; 2], rng: &mut ChaCha8Rng) -> f64 {
     least * (most / least).powf(rng.random::<f64>())
 }

@@ -1,4 +1,4 @@
-//! The controllers that drive the arm. They know the URDF and the tool, and none of the physics beyond.
+//! Controllers of the arm. They know the URDF and the tool, but no physics beyond these.
 
 mod impedance;
 mod joint;
@@ -15,14 +15,14 @@ use joint::JointController;
 /// A controller for one arm.
 #[derive(Debug)]
 pub(super) enum Controller {
-    /// Keeps each joint where it should be.
+    /// Position control of each joint.
     Joint(Box<JointController>),
-    /// Keeps the tool where it should be, as softly as it is told.
+    /// Cartesian impedance control of the tool.
     Impedance(Box<ImpedanceController>),
 }
 
 impl Controller {
-    /// The controller that the settings choose, for an arm that begins at `position`.
+    /// Creates the controller that the settings select, for an arm that starts at `position`.
     pub fn new(
         model: &Model,
         settings: &ControllerSettings,
@@ -50,7 +50,7 @@ impl Controller {
         Ok(Self::Impedance(Box::new(impedance)))
     }
 
-    /// Takes a new target, `dt_s` after the one before, and what the encoders say.
+    /// Takes a new target, `dt_s` after the previous one, and the encoder readings.
     pub fn update(&mut self, dt_s: f64, target: &Target, position: &[f64], velocity: &[f64]) {
         match self {
             Self::Joint(joint) => joint.update(dt_s, target, position),
@@ -58,7 +58,7 @@ impl Controller {
         }
     }
 
-    /// What it tells the drives, `elapsed_s` after the target.
+    /// Returns the command to the drives, `elapsed_s` after the target.
     pub fn drive(&mut self, elapsed_s: f64) -> Drive<'_> {
         match self {
             Self::Joint(joint) => joint.drive(elapsed_s),

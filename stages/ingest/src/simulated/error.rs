@@ -1,20 +1,20 @@
-//! Why a scenario cannot be simulated.
+//! Errors of scenarios and their simulation.
 
 use tauscope_archive::WriteError;
 use tauscope_dynamics::terms::TermError;
 
 use super::inverse::{Goal, Missed};
 
-/// Why a scenario cannot be simulated.
+/// Errors of scenarios and their simulation.
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
-    /// Whoever opens a simulated source must bring the scenario and its robot.
+    /// A simulated source opened without its scenario and robot.
     #[error("the scenario and its robot were not loaded")]
     NotLoaded,
-    /// A link that the robot has not.
+    /// A link that the robot does not have.
     #[error("{what} is on link `{link}`, which the robot does not have; its links: {known}")]
     UnknownLink {
-        /// What is to act there.
+        /// Object that acts on the link.
         what: &'static str,
         /// The link in the file.
         link: String,
@@ -28,12 +28,12 @@ pub enum ScenarioError {
     FixedLink {
         /// The recording.
         recording: String,
-        /// What is to act there.
+        /// Object that acts on the link.
         what: &'static str,
         /// The link in the file.
         link: String,
     },
-    /// A joint that the robot has not.
+    /// A joint that the robot does not have.
     #[error("{what} names joint `{joint}`, which the robot does not have; its joints: {known}")]
     UnknownJoint {
         /// The key in the file.
@@ -43,7 +43,7 @@ pub enum ScenarioError {
         /// The robot's joints.
         known: String,
     },
-    /// The effort is a current, and a joint has no torque constant.
+    /// An effort in amperes for a joint without a torque constant.
     #[error(
         "effort_unit is A, but torque_constants_nm_per_a has no value above 0 for joint `{joint}`"
     )]
@@ -51,30 +51,30 @@ pub enum ScenarioError {
         /// The joint.
         joint: String,
     },
-    /// An effect that cannot be suffered.
+    /// An invalid effect.
     #[error(transparent)]
     Term(#[from] TermError),
-    /// Not exactly one kind of motion.
+    /// A number of motions other than one.
     #[error(
         "recording `{recording}`: `motion` has exactly one of `points`, `fourier` and `recorded`, found {found}"
     )]
     OneMotion {
         /// The recording.
         recording: String,
-        /// How many were given.
+        /// Number of motions given.
         found: usize,
     },
-    /// A position of another robot.
+    /// A position with the wrong number of joints.
     #[error("{what} has {found} values, the robot has {expected} joints")]
     JointCount {
         /// The key in the file.
         what: &'static str,
-        /// Values there.
+        /// Number of values in the file.
         found: usize,
-        /// Joints of the robot.
+        /// Number of joints of the robot.
         expected: usize,
     },
-    /// A point that the robot cannot take.
+    /// A position outside the limits of a joint.
     #[error("{what}: {value} is outside of joint `{joint}`'s limits {lower} to {upper}")]
     OutsideLimits {
         /// The key in the file.
@@ -88,7 +88,7 @@ pub enum ScenarioError {
         /// Its upper limit.
         upper: f64,
     },
-    /// A place that no position of the joints reaches.
+    /// A place that no joint positions reach.
     #[error(
         "{what}: link `{link}` cannot reach [{}, {}, {}] m{}: at best it is {distance_m:.4} m and {angle_rad:.4} rad off. Move the point, start from another `reach.posture`{}",
         place_m[0], place_m[1], place_m[2],
@@ -104,35 +104,35 @@ pub enum ScenarioError {
         place_m: [f64; 3],
         /// Whether the orientation matters.
         oriented: bool,
-        /// How far the link stays away \[m\].
+        /// Smallest distance of the link from the place \[m\].
         distance_m: f64,
-        /// How far it stays turned \[rad\].
+        /// Angle between the link's orientation there and the wanted one \[rad\].
         angle_rad: f64,
     },
-    /// No random point is high enough.
+    /// A minimum height that no random point keeps.
     #[error(
         "none of {tries} random points keeps every link {min_height_m} m above the base: take a smaller `range` or `min_height_m`"
     )]
     NoPoint {
-        /// Points that were tried.
+        /// Number of points tried.
         tries: usize,
-        /// The height wanted.
+        /// The minimum height \[m\].
         min_height_m: f64,
     },
-    /// Two numbers the wrong way round, or a time that is none.
+    /// An invalid range or time.
     #[error("{what}: {reason}")]
     Range {
         /// The key in the file.
         what: &'static str,
-        /// What is wrong.
+        /// Reason why it is invalid.
         reason: String,
     },
-    /// More joints than a sample has room for.
+    /// More joints than a sample holds.
     #[error("{found} joints, at most {limit} are supported")]
     TooManyJoints {
-        /// How many there are.
+        /// Number of joints.
         found: usize,
-        /// How many fit.
+        /// Maximum number of joints.
         limit: usize,
     },
     /// A recording that the scenario does not make, or makes twice.
@@ -140,12 +140,12 @@ pub enum ScenarioError {
     Recording {
         /// The name.
         name: String,
-        /// What is wrong with it.
+        /// Reason why it is refused.
         reason: &'static str,
-        /// The recordings there are.
+        /// The scenario's recordings.
         known: String,
     },
-    /// Elasticity and play, or two of one, in the same joint.
+    /// Elasticity and backlash, or two of either, in the same joint.
     #[error(
         "joint `{joint}` has more than one of `joint_elasticity` and `backlash`: one at most is simulated"
     )]
@@ -153,10 +153,10 @@ pub enum ScenarioError {
         /// The joint.
         joint: String,
     },
-    /// What cannot be concealed.
+    /// Effects that cannot be concealed.
     #[error("conceal: {reason}")]
     Conceal {
-        /// Why.
+        /// Reason.
         reason: String,
     },
     /// An effect that the simulated arm cannot have.
@@ -164,10 +164,10 @@ pub enum ScenarioError {
     NotSimulated {
         /// The effect.
         effect: &'static str,
-        /// Why not.
+        /// Reason.
         reason: &'static str,
     },
-    /// The arm ran away: the controller is unstable with this physics.
+    /// A runaway arm: the controller is unstable with this physics.
     #[error(
         "joint `{joint}` runs away {time_s:.3} s into recording `{recording}`: a stiffer effect than the controller can hold"
     )]
@@ -176,27 +176,27 @@ pub enum ScenarioError {
         recording: String,
         /// The joint.
         joint: String,
-        /// When \[s\].
+        /// Time since the start of the recording \[s\].
         time_s: f64,
     },
-    /// The recorded motion cannot be read.
+    /// A recorded motion that cannot be read.
     #[error("recorded motion: {0}")]
     Motion(#[source] Box<crate::IngestError>),
-    /// A recording cannot be written.
+    /// A recording that cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The labels cannot be written.
+    /// Labels that cannot be written.
     #[error("{}: {source}", path.display())]
     Labels {
         /// The file.
         path: std::path::PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
 }
 
 impl ScenarioError {
-    /// A goal that was missed.
+    /// Creates the error for a missed goal.
     pub(super) fn out_of_reach(what: String, link: &str, goal: &Goal, missed: Missed) -> Self {
         Self::OutOfReach {
             what,

@@ -1,8 +1,8 @@
-//! Inverse kinematics: joint positions that bring a point of a link somewhere.
+//! Inverse kinematics: joint positions that bring a point of a link to a place.
 //!
 //! Levenberg and Marquardt's damped least squares on the pose error, as Sugihara (2011) and Nakamura and
-//! Hanafusa (1986) propose it for arms, kept within the joints' limits: a joint at its limit does not take
-//! part in a step that would lead beyond.
+//! Hanafusa (1986) propose it for arms, kept within the joints' limits: a joint at its limit is excluded
+//! from a step that would exceed it.
 
 use nalgebra::{DMatrix, DVector, Isometry3, UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
@@ -13,40 +13,40 @@ use tauscope_dynamics::{Data, Model, forward_kinematics};
 use super::link_point::LinkPoint;
 use super::trajectory::JointRange;
 
-/// Near enough \[m\], \[rad\].
-/// Resolution: far below what a motion is drawn to.
+/// Tolerance of position and orientation \[m\], \[rad\].
+/// Resolution: far below the precision to which a motion is drawn.
 const NEAR: f64 = 1e-6;
-/// Steps from one start.
+/// Maximum number of steps from one start.
 /// Resolution: bounds the computing time of a start.
 const STEPS: usize = 200;
-/// Other starts, at random, for a point that must be reached.
+/// Number of further, random starts for a point that must be reached.
 /// Resolution: bounds the computing time; a point that is not reached by then is an error.
 const OTHER_STARTS: usize = 30;
-/// A radian counts as this many metres.
+/// Weight of rotation against translation in the pose error \[m/rad\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const METRES_PER_RADIAN: f64 = 0.3;
 /// Damping of the first step.
 /// Resolution: changes the number of steps.
 const FIRST_DAMPING: f64 = 1e-3;
-/// With a larger damping no step is of use any more.
+/// Largest damping; beyond it no step makes progress.
 /// Resolution: ends a start that is stuck.
 const LAST_DAMPING: f64 = 1e6;
 
-/// Where the point of a link ought to be.
+/// Target of a point of a link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Goal {
-    /// World frame \[m\].
+    /// Place in the world frame \[m\].
     pub place: Vector3<f64>,
-    /// Of the link; `None` for any.
+    /// Orientation of the link; `None` for any.
     pub orientation: Option<UnitQuaternion<f64>>,
 }
 
-/// How near the arm came to a goal that it does not reach.
+/// Smallest pose error for a goal that the arm does not reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Missed {
-    /// \[m\]
+    /// Distance from the place \[m\].
     pub distance_m: f64,
-    /// \[rad\]
+    /// Angle from the orientation \[rad\].
     pub angle_rad: f64,
 }
 
@@ -56,7 +56,7 @@ impl Missed {
     }
 }
 
-/// An arm whose point is to go somewhere.
+/// Inverse kinematics of a point of an arm.
 #[derive(Debug)]
 pub(super) struct Inverse {
     model: Model,
@@ -75,24 +75,24 @@ impl Inverse {
         }
     }
 
-    /// Name of the link.
+    /// Returns the name of the link.
     pub fn link_name(&self) -> &str {
         &self.model.links()[self.point.link].name
     }
 
-    /// Where the point is at `position`.
+    /// Returns the pose of the point at `position`.
     pub fn pose(&mut self, position: &[f64]) -> Isometry3<f64> {
         forward_kinematics(&self.model, &mut self.data, position);
         self.point.pose(&self.model, &self.data)
     }
 
-    /// Positions that reach the goal, found from `start`, and from elsewhere if they cannot be.
+    /// Returns positions that reach the goal, searched from `start`, then from random positions.
     pub fn reach(&mut self, goal: &Goal, start: &JointArray) -> Result<JointArray, Missed> {
         let mut best = match self.reach_from(goal, start) {
             Ok(found) => return Ok(found),
             Err(missed) => missed,
         };
-        // The same for every seed: whether a point can be reached is not a matter of luck.
+        // A fixed seed: whether a point can be reached must not depend on the scenario's seed.
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         for _ in 0..OTHER_STARTS {
             let mut other = [0.0; MAX_JOINTS];
@@ -108,7 +108,7 @@ impl Inverse {
         Err(best)
     }
 
-    /// Positions that reach the goal, found from `start` alone.
+    /// Returns positions that reach the goal, searched from `start` alone.
     pub fn reach_from(&mut self, goal: &Goal, start: &JointArray) -> Result<JointArray, Missed> {
         let n = self.joints.len();
         let mut position = *start;
@@ -119,7 +119,7 @@ impl Inverse {
             if missed.distance_m < NEAR && missed.angle_rad < NEAR {
                 return Ok(position);
             }
-            // The last try was taken, so the kinematics are those of `position`.
+            // The last step was accepted, so the kinematics are those of `position`.
             let mut jacobian = self.jacobian(goal);
             let downhill = jacobian.transpose() * &error;
             for (j, joint) in self.joints.iter().enumerate() {
@@ -158,7 +158,7 @@ impl Inverse {
         Err(missed(&error))
     }
 
-    /// How far there is to go, as a velocity would be: metres, and after them what angles count as such.
+    /// Returns the pose error: the translation, followed by the rotation vector scaled to metres.
     fn error(&mut self, goal: &Goal, position: &[f64]) -> DVector<f64> {
         let pose = self.pose(position);
         let way = goal.place - pose.translation.vector;

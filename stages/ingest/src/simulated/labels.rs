@@ -1,4 +1,4 @@
-//! `labels.json`: what was done to the arm, and when.
+//! `labels.json`: the contacts of the arm and their times.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::scenario::{ContactKind, LabelSpec, RecordingSpec, Role};
 use super::simulation::Event;
 
-/// Weaker pushes are too weak to count \[N\].
+/// Peak force below which a push is labelled to be ignored \[N\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const WEAK_N: f64 = 2.0;
 
@@ -39,15 +39,16 @@ struct EventLabel {
     t_off: f64,
     kind: ContactKind,
     link: String,
-    /// Those between the base and the link, and the torque that the force does in each at its peak.
+    /// Joints between the base and the link.
     joints: Vec<String>,
+    /// Torque of the peak force in each of these joints.
     joint_torques: Vec<f64>,
     point: [f64; 3],
     force: [f64; 3],
     peak_force: f64,
     direction: [f64; 3],
     ignore: bool,
-    /// The kind of contact it came on top of.
+    /// Kind of the contact that was in progress at its begin.
     #[serde(skip_serializing_if = "Option::is_none")]
     during: Option<ContactKind>,
     #[serde(flatten)]
@@ -94,7 +95,7 @@ impl RecordingLabels {
     }
 }
 
-/// To four digits: nobody knows a push better.
+/// Rounds to four decimals, which is beyond the precision of a real push.
 fn round(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }

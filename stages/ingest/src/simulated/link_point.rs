@@ -1,4 +1,4 @@
-//! A point of a link: where it is, and how it moves.
+//! Pose and Jacobian of a point of a link.
 
 use nalgebra::{Isometry3, Matrix6xX, Vector3};
 use tauscope_dynamics::{Data, Model, link_jacobian, link_pose};
@@ -6,7 +6,7 @@ use tauscope_dynamics::{Data, Model, link_jacobian, link_pose};
 use super::error::ScenarioError;
 use super::push::find_link;
 
-/// A point that is fixed to a link. It is asked for after the forward kinematics.
+/// A point that is fixed to a link. Its methods require the forward kinematics in `data`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LinkPoint {
     /// The link's place in the model.

@@ -9,7 +9,7 @@ use super::plant::{Contact, Plant};
 use super::scenario::{ContactKind, LabelSpec, ObstacleSpec, RecordingSpec};
 use super::simulation::Event;
 
-/// Touches of an obstacle that are less than this apart are one: the arm bounces \[s\].
+/// Gap below which two touches of an obstacle are merged into one, since the arm bounces \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const BOUNCE_S: f64 = 0.2;
 
@@ -32,7 +32,7 @@ enum Shape {
 }
 
 impl Shape {
-    /// How far a point is outside, less than 0 inside, and the direction out.
+    /// Returns the signed distance of a point from the surface, negative inside, and the outward normal.
     fn distance(&self, point: &Vector3<f64>) -> (f64, Vector3<f64>) {
         match self {
             Self::Plane { normal, offset_m } => (normal.dot(point) - offset_m, *normal),
@@ -63,7 +63,7 @@ impl Shape {
     }
 }
 
-/// An obstacle, and the touch that is going on.
+/// An obstacle and its current touch.
 #[derive(Debug)]
 pub(super) struct Obstacle {
     shape: Shape,
@@ -158,7 +158,7 @@ impl Obstacle {
         })
     }
 
-    /// Refuses an arm that is inside to begin with.
+    /// Refuses an arm that starts inside the obstacle.
     pub fn check_start(&self, plant: &mut Plant) -> Result<(), ScenarioError> {
         let (tip, _) = plant.motion_of(&self.tip);
         let depth_m = self.radius_m - self.shape.distance(&tip).0;
@@ -175,7 +175,7 @@ impl Obstacle {
         ))
     }
 
-    /// The force on the arm now, if there is one: `max(0, K depth + B depth')` along the normal.
+    /// Returns the force on the arm, if there is one: `max(0, K depth + B depth')` along the normal.
     pub fn contact(&self, time_s: f64, plant: &mut Plant) -> Option<Contact> {
         let [from_s, to_s] = self.window_s;
         if !(from_s <= time_s && time_s < to_s) {
@@ -195,7 +195,7 @@ impl Obstacle {
         })
     }
 
-    /// Takes note of the step from `time_s` on; a touch that is over comes back.
+    /// Records the contact of the step from `time_s` to `until_s`; returns a touch that has ended.
     pub fn note(
         &mut self,
         time_s: f64,
@@ -220,7 +220,7 @@ impl Obstacle {
         ended
     }
 
-    /// The touch that is not over yet.
+    /// Returns the touch that has not ended yet.
     pub fn rest(&mut self) -> Option<Event> {
         self.event.take()
     }

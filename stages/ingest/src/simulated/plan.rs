@@ -1,4 +1,4 @@
-//! What is planned for a recording before anything moves.
+//! Planning of a recording before its simulation.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -13,10 +13,10 @@ use crate::config::{Config, CsvConfig, FileConfig, Topics};
 use crate::recorded::RecordedSource;
 use crate::setup::Setup;
 
-/// The plant is integrated at 4 kHz.
+/// Integration step of the plant \[ns\].
 /// Resolution: the error of the integration, against its computing time.
 pub(super) const STEP_NS: i64 = 250_000;
-/// Between two recordings of a session \[ns\].
+/// Pause between two recordings of a session \[ns\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const PAUSE_NS: i64 = 10_000_000_000;
 /// Range to either side of a joint without limits \[rad\].
@@ -25,18 +25,18 @@ const FREE_RANGE: f64 = std::f64::consts::PI;
 /// Highest velocity of a joint without limit \[rad/s\].
 /// Physical: about the joint speed limit of common arms, 2 to 3 rad/s.
 const FREE_VELOCITY: f64 = 2.0;
-/// Random streams of one recording.
-/// Resolution: at least the number of streams that [`random`] is asked for.
+/// Number of random streams per recording.
+/// Resolution: at least the number of streams requested from [`random`].
 const STREAMS: u64 = 8;
 
-/// The random numbers of a recording's stream: 0 for its motion, 1 for its pushes, 2 for its sensors.
+/// Returns the random numbers of a recording's stream: 0 for its motion, 1 for its pushes, 2 for its sensors.
 pub(super) fn random(scenario: &Scenario, index: usize, stream: u64) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(scenario.seed);
     rng.set_stream(index as u64 * STREAMS + stream);
     rng
 }
 
-/// When a recording starts in its session \[ns\].
+/// Returns the start of a recording in its session \[ns\].
 pub(super) fn offset_ns(scenario: &Scenario, index: usize) -> i64 {
     let before = scenario.recordings[..index].iter();
     before
@@ -44,12 +44,12 @@ pub(super) fn offset_ns(scenario: &Scenario, index: usize) -> i64 {
         .sum()
 }
 
-/// Steps of the plant in a time.
+/// Returns the number of steps of the plant in a duration.
 pub(super) fn whole_steps(duration_s: f64) -> i64 {
     (duration_s * 1e9 / STEP_NS as f64).round() as i64
 }
 
-/// What the joints can do, with sensible ranges where the URDF gives none.
+/// Returns the limits of the joints, with default ranges where the URDF gives none.
 pub(super) fn joint_ranges(model: &Model) -> Result<Vec<JointRange>, ScenarioError> {
     if model.dof() > MAX_JOINTS {
         return Err(ScenarioError::TooManyJoints {
@@ -70,7 +70,7 @@ pub(super) fn joint_ranges(model: &Model) -> Result<Vec<JointRange>, ScenarioErr
     Ok(ranges.collect())
 }
 
-/// The arm with the tool that its controller knows of.
+/// Returns the arm with the tool that its controller knows.
 pub(super) fn with_tool(scenario: &Scenario, model: &Model) -> Result<Model, ScenarioError> {
     let mut model = model.clone();
     if let Some(tool) = &scenario.tool {
@@ -81,7 +81,7 @@ pub(super) fn with_tool(scenario: &Scenario, model: &Model) -> Result<Model, Sce
     Ok(model)
 }
 
-/// The motion of a recording; `model` is with the tool.
+/// Returns the motion of a recording; `model` includes the tool.
 pub(super) fn trajectory(
     spec: &RecordingSpec,
     model: &Model,
@@ -112,7 +112,7 @@ pub(super) fn trajectory(
     }
 }
 
-/// Says of a position whether every moving link's frame is high enough.
+/// Returns a predicate of positions that requires every moving link's frame to be high enough.
 fn above(model: Model, min_height_m: Option<f64>) -> Allowed {
     let Some(least_m) = min_height_m else {
         return Box::new(|_| true);
@@ -127,7 +127,7 @@ fn above(model: Model, min_height_m: Option<f64>) -> Allowed {
     })
 }
 
-/// The positions of a recording or of a table, seconds from its first.
+/// Reads the positions of a recording or table, at times relative to its first sample.
 fn read_motion(
     recorded: &RecordedMotionSpec,
     joints: &[JointRange],

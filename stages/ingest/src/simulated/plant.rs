@@ -1,4 +1,4 @@
-//! The arm itself: its URDF, and the physics that the URDF does not tell of.
+//! The arm itself: its URDF, and the physics beyond the URDF.
 
 use nalgebra::{Cholesky, DMatrix, DVector, LU};
 use tauscope_dynamics::terms::TermSpec;
@@ -18,56 +18,57 @@ pub(super) use drive::{Damping, Drive};
 use physics::{Carried, JointTerms, Loads, Physics, Step};
 use transmission::{Coupling, Rotor};
 
-/// A solution is found once no velocity changes by more than this \[rad/s\].
+/// Convergence tolerance of Newton's iteration, as the largest change of a velocity \[rad/s\].
 /// Resolution: far below any encoder's noise.
 const TOLERANCE: f64 = 1e-10;
-/// Most iterations of a solution.
+/// Maximum number of iterations per step.
 /// Resolution: bounds the computing time of a step.
 const MAX_ITERATIONS: usize = 30;
-/// Step by which slopes of the physics are found \[rad/s\].
+/// Finite-difference step for slopes of the physics \[rad/s\].
 /// Resolution: between the curvature over a long step and the rounding over a short one.
 const SLOPE_STEP: f64 = 1e-6;
-/// How often the arm is asked what its links bear until they hang as they do at rest.
+/// Number of iterations that find the deflection of elastic joints at rest.
 /// Resolution: bounds the computing time before the first sample.
 const SETTLING_STEPS: usize = 100;
 
 /// The arm and its state.
 ///
 /// Equation of motion: `M(q) qdd + h(q, qd) + physics(q, qd, qdd) = effort + Jᵀ F`, with the physics
-/// as the effort that it costs. In a joint with elasticity or play the link has only what comes through,
-/// `M qdd + h = T + Jᵀ F`, and the rotor, which carries the encoder, the rest: `J θdd + physics = effort - T`.
+/// as the effort that it costs. A joint with elasticity or backlash transmits the torque T to its link,
+/// `M qdd + h = T + Jᵀ F`, from its rotor, which carries the encoder: `J θdd + physics = effort - T`.
 #[derive(Debug)]
 pub(super) struct Plant {
-    /// The arm as it is now, and without what it carries for a while.
+    /// The arm with the bodies it carries now; `empty` is the arm without them.
     model: Model,
     empty: Model,
     carried: Vec<Carried>,
-    /// Which of those are there.
+    /// Whether each of these is carried now.
     there: Vec<bool>,
     data: Data,
     loads: Loads,
     joints: JointTerms,
     rotors: Vec<Rotor>,
-    /// Of the links.
+    /// Position of the links.
     link_position: Vec<f64>,
     link_velocity: Vec<f64>,
-    /// Where the encoders are.
+    /// Position of the encoders.
     position: Vec<f64>,
     velocity: Vec<f64>,
-    /// Of the step that led here.
+    /// Effort of the drives in the last step.
     applied_nm: Vec<f64>,
-    /// Time since the start of the recording, and of the recording since that of the session \[s\].
+    /// Time since the start of the recording \[s\].
     recording_s: f64,
+    /// Start of the recording in the session \[s\].
     session_start_s: f64,
     work: Work,
 }
 
-/// Memory of a step, used again for the next. Velocities are those of the links and, after them, of the
+/// Buffers of a step, reused for the next. Velocities are those of the links, followed by those of the
 /// rotors.
 #[derive(Debug)]
 struct Work {
     zero: Vec<f64>,
-    /// Gravity and the like, less the contacts.
+    /// Bias effort (gravity, Coriolis) plus external loads, minus the effort of contacts.
     load: Vec<f64>,
     velocity: Vec<f64>,
     beside: Vec<f64>,
@@ -75,7 +76,7 @@ struct Work {
     effort_beside: Vec<f64>,
     effort_at_rest: Vec<f64>,
     couplings: Vec<Coupling>,
-    /// Where the motor of each joint is among the velocities.
+    /// Index of each joint's motor in the velocities.
     motor: Vec<usize>,
     inertia: DMatrix<f64>,
     system: DMatrix<f64>,
@@ -83,7 +84,7 @@ struct Work {
 }
 
 impl Work {
-    /// Adds what passes between the rotors and their links, which follow the `links` joints of the arm.
+    /// Adds the torques between links and rotors; the rotors follow the `links` joints of the arm.
     fn add_couplings(
         &mut self,
         rotors: &[Rotor],
@@ -132,7 +133,7 @@ impl Work {
 }
 
 impl Plant {
-    /// An arm at rest, its encoders at `position`, with all of `physics` but what acts on the record.
+    /// Creates an arm at rest, its encoders at `position`, with `physics` except the terms of the record.
     pub fn new(
         model: &Model,
         physics: &[TermSpec],
@@ -163,7 +164,7 @@ impl Plant {
         Ok(plant)
     }
 
-    /// Lets the links hang behind their rotors as they do at rest.
+    /// Sets the links to their deflection from the rotors at rest.
     fn settle(&mut self) {
         if self.rotors.is_empty() {
             return;
@@ -184,23 +185,23 @@ impl Plant {
         }
     }
 
-    /// Sets when the recording starts in its session.
+    /// Sets the start of the recording in its session.
     pub fn starting_at(mut self, session_start_s: f64) -> Self {
         self.session_start_s = session_start_s;
         self
     }
 
-    /// When the recording starts in its session \[s\].
+    /// Returns the start of the recording in its session \[s\].
     pub fn session_start_s(&self) -> f64 {
         self.session_start_s
     }
 
-    /// Of the encoders \[rad\].
+    /// Returns the position of the encoders \[rad\].
     pub fn position(&self) -> &[f64] {
         &self.position
     }
 
-    /// Of the encoders \[rad/s\].
+    /// Returns the velocity of the encoders \[rad/s\].
     pub fn velocity(&self) -> &[f64] {
         &self.velocity
     }
@@ -209,12 +210,12 @@ impl Plant {
         &self.model.links()[link].name
     }
 
-    /// Effort of the drives in the step that led here, which balances the arm where that began \[N m\].
+    /// Returns the effort of the drives in the last step, which balances the arm at its beginning \[N m\].
     pub fn applied_nm(&self) -> &[f64] {
         &self.applied_nm
     }
 
-    /// Moves on by `dt_s`.
+    /// Integrates over `dt_s`.
     ///
     /// Semi-implicit: the new velocity is the solution v of
     /// `M (v - v0) = dt (effort(v) + Jᵀ F - h(q0, v0) - physics(q0, v))`, the new position q0 + dt v. The
@@ -272,7 +273,7 @@ impl Plant {
             recording_s: self.recording_s,
             session_s,
         };
-        // Once more with the time that passes, so that what has a memory remembers this step.
+        // Evaluated once more with the elapsed time, so that terms with internal state record this step.
         self.joints
             .cost(&step, dt_s, &work.velocity, &mut work.effort);
         let (links, rotors) = work.velocity.split_at(n);
@@ -297,7 +298,7 @@ impl Plant {
         self.recording_s += dt_s;
     }
 
-    /// Makes what is carried now part of the arm.
+    /// Updates the arm's model to the bodies that it carries now.
     fn pick_up_and_drop(&mut self) {
         let mut changed = false;
         for (there, carried) in self.there.iter_mut().zip(&self.carried) {
@@ -314,8 +315,8 @@ impl Plant {
         }
     }
 
-    /// Brings the new velocity nearer to the solution by a step of Newton's, and gives that step's
-    /// largest change; `None` if there is no such step.
+    /// Takes one step of Newton's iteration for the new velocity; returns its largest change, `None` if
+    /// the system is singular.
     fn approach(&mut self, dt_s: f64, drive: &Drive<'_>) -> Option<f64> {
         let n = self.link_position.len();
         let work = &mut self.work;
@@ -354,9 +355,8 @@ impl Plant {
             let velocity = work.velocity[motor];
             let (effort, limited) = drive.effort(j, Motors(&work.motor, &work.velocity));
             work.missing[motor] += dt_s * (effort - work.effort[j]);
-            // How fast the physics' effort grows: its slope or, where that is more, the slope of its
-            // line through standstill, which keeps a step through the kink of Coulomb friction from
-            // going too far.
+            // Slope of the physics' effort or, if larger, its secant slope from standstill. The secant
+            // keeps a step through the kink of Coulomb friction from overshooting.
             let slope = (work.effort_beside[j] - work.effort[j]) / SLOPE_STEP;
             let line = if velocity.abs() > SLOPE_STEP {
                 (work.effort[j] - work.effort_at_rest[j]) / velocity
@@ -373,7 +373,7 @@ impl Plant {
             one_sided |= limited && matches!(drive.damping, Damping::Coupled(_));
         }
         if one_sided {
-            // A joint at its limit does not feel the others' velocities, but they feel its own.
+            // Asymmetric: a saturated joint does not react to the other joints' velocities, but they react to its.
             let factors = LU::new(system);
             if !factors.solve_mut(&mut work.missing) {
                 return None;

@@ -1,4 +1,4 @@
-//! Pushes: forces on links for a while.
+//! Pushes: temporary forces on links.
 
 use std::f64::consts::PI;
 
@@ -12,18 +12,18 @@ use super::error::ScenarioError;
 use super::plant::Contact;
 use super::scenario::{ContactKind, HandsSpec, LabelSpec, Profile, RecordingSpec};
 
-/// A hand takes hold within this distance of a link's centre of mass, along each axis \[m\].
+/// Largest distance of a random push from the link's centre of mass, along each axis \[m\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const REACH_M: f64 = 0.03;
 
 /// A force on a link that rises, holds and falls.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Push {
-    /// The link's place in the model.
+    /// Index of the link in the model.
     pub link: usize,
-    /// In the link's frame \[m\].
+    /// Point of application in the link's frame \[m\].
     pub point_m: [f64; 3],
-    /// At its peak, on the robot, world frame \[N\].
+    /// Peak force on the robot, world frame \[N\].
     pub force_n: [f64; 3],
     pub on_s: f64,
     pub off_s: f64,
@@ -34,7 +34,7 @@ pub(super) struct Push {
 }
 
 impl Push {
-    /// The share of its peak that the force has, 0 to 1.
+    /// Returns the force at `t_s` as a fraction of its peak, 0 to 1.
     pub fn share(&self, t_s: f64) -> f64 {
         let rise_s = self.rise_s.min(0.5 * (self.off_s - self.on_s));
         let inside_s = (t_s - self.on_s).min(self.off_s - t_s);
@@ -49,7 +49,7 @@ impl Push {
         }
     }
 
-    /// Its force, at a share of the peak.
+    /// Returns its contact force at a fraction of the peak.
     pub fn contact(&self, share: f64) -> Contact {
         Contact {
             link: self.link,
@@ -58,18 +58,18 @@ impl Push {
         }
     }
 
-    /// Whether there is a force.
+    /// Whether the force acts at `t_s`.
     pub fn acts(&self, t_s: f64) -> bool {
         self.on_s < t_s && t_s < self.off_s
     }
 
-    /// When it is strongest, halfway \[s\].
+    /// Returns the time of its peak, halfway \[s\].
     pub fn peak_s(&self) -> f64 {
         0.5 * (self.on_s + self.off_s)
     }
 }
 
-/// The pushes of a recording, in the order they begin.
+/// Returns the pushes of a recording, ordered by their begin.
 pub(super) fn pushes(
     spec: &RecordingSpec,
     model: &Model,
@@ -108,7 +108,7 @@ pub(super) fn pushes(
     Ok(pushes)
 }
 
-/// One push in each equal part of the recording.
+/// Draws one push in each of `count` equal parts of the recording.
 fn draw(
     hands: &HandsSpec,
     spec: &RecordingSpec,
@@ -165,7 +165,7 @@ fn draw(
     Ok(pushes.collect())
 }
 
-/// The place of a link that a joint moves: of a push on another nothing could be felt.
+/// Returns the index of a link, which a joint must move: otherwise no joint would feel the push.
 fn moving_link(
     spec: &RecordingSpec,
     model: &Model,
@@ -183,7 +183,7 @@ fn moving_link(
     }
 }
 
-/// The place of a link in the model.
+/// Returns the index of a link in the model.
 pub(super) fn find_link(
     model: &Model,
     what: &'static str,

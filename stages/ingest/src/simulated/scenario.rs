@@ -1,4 +1,4 @@
-//! `SCENARIO.yaml`: what a simulated cell is and does.
+//! `SCENARIO.yaml`: the description of a simulated cell and its recordings.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -21,7 +21,7 @@ pub use contacts::{
 pub use controller::{ControllerSettings, Damps, ImpedanceSpec};
 pub use motion::{FourierSpec, MotionSpec, PointsSpec, ReachSpec, RecordedMotionSpec, WithinSpec};
 
-/// A simulated cell and the recordings it makes. The same file makes the same bytes every time.
+/// A simulated cell and its recordings. The result is deterministic: the same file gives the same bytes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
@@ -33,45 +33,45 @@ pub struct Scenario {
     pub name: String,
     /// The robot's URDF; relative to this file.
     pub robot: PathBuf,
-    /// Everything random follows from this number and the recording's place in the list.
+    /// Seed of all random numbers; each recording draws its own, by its position in the list.
     #[serde(default)]
     pub seed: u64,
     /// Stamp of the first sample of the first recording \[s since the epoch\].
     #[serde(default = "default_start_s")]
     #[schemars(range(min = 1, max = 2_000_000_000))]
     pub start_s: u32,
-    /// Joint states a second.
+    /// Rate of the joint states \[Hz\].
     #[serde(default = "default_rate_hz")]
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub rate_hz: f64,
-    /// Unit of the recorded effort: `Nm`, or `A` by the torque constants.
+    /// Unit of the recorded effort: `Nm`, or `A` through the torque constants.
     #[serde(default)]
     pub effort_unit: EffortUnit,
     /// Torque constants by joint, joint side of the gear \[N m/A\]; each joint needs one if the unit is `A`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub torque_constants_nm_per_a: BTreeMap<String, f64>,
-    /// A tool that is attached, and that the controller knows of.
+    /// An attached tool, known to the controller.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool: Option<ToolSpec>,
-    /// What the real arm has and the URDF does not say.
+    /// Effects of the real arm that are missing in the URDF.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub physics: Vec<TermSpec>,
-    /// More of that, drawn at random: for somebody to find.
+    /// Further effects, drawn at random and concealed, to be found by an identification.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub conceal: Option<ConcealSpec>,
-    /// How it is measured.
+    /// Sensors of the arm.
     #[serde(default)]
     pub sensors: Sensors,
-    /// How it is driven.
+    /// Controller of the arm.
     #[serde(default)]
     pub controller: ControllerSettings,
-    /// The recordings, in the order of their stamps: together they are one session.
+    /// The recordings, ordered by their stamps; together they are one session.
     #[schemars(length(min = 1))]
     pub recordings: Vec<RecordingSpec>,
 }
 
 impl Scenario {
-    /// The names of its recordings, for an error.
+    /// Returns the names of its recordings, for an error.
     pub(super) fn recording_names(&self) -> String {
         let names: Vec<&str> = self
             .recordings
@@ -81,7 +81,7 @@ impl Scenario {
         names.join(", ")
     }
 
-    /// Every path in it, so that the program can resolve them against the scenario file.
+    /// Returns all paths in it, so that the program can resolve them against the scenario file.
     pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let motions = self.recordings.iter_mut().map(|each| &mut each.motion);
         let recorded = motions.filter_map(|motion| motion.recorded.as_mut());
@@ -105,7 +105,7 @@ fn default_rate_hz() -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ToolSpec {
-    /// The link it is attached to, in whose frame it is described.
+    /// The link it is attached to, which is also the frame of its parameters.
     pub link: String,
     /// Mass \[kg\].
     #[schemars(range(min = 0.0))]
@@ -118,7 +118,7 @@ pub struct ToolSpec {
     pub inertia_kgm2: [f64; 6],
 }
 
-/// How the arm is measured. What is not given is exact.
+/// Sensors of the arm. They are exact, except for the errors given here.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sensors {
@@ -127,28 +127,28 @@ pub struct Sensors {
     /// White noise on positions, standard deviation \[rad\].
     #[schemars(range(min = 0.0))]
     pub position_noise_rad: f64,
-    /// Step of the encoder; 0 for none \[rad\].
+    /// Quantisation step of the encoder; 0 for none \[rad\].
     #[schemars(range(min = 0.0))]
     pub position_step_rad: f64,
     /// White noise on velocities, standard deviation \[rad/s\].
     #[schemars(range(min = 0.0))]
     pub velocity_noise_rad_s: f64,
-    /// Step of the velocity; 0 for none \[rad/s\].
+    /// Quantisation step of the velocity; 0 for none \[rad/s\].
     #[schemars(range(min = 0.0))]
     pub velocity_step_rad_s: f64,
     /// White noise on efforts, standard deviation \[N m\].
     #[schemars(range(min = 0.0))]
     pub effort_noise_nm: f64,
-    /// White noise on efforts as a share of the joint's effort limit, standard deviation; adds to the other.
+    /// Further white noise on efforts, standard deviation as a fraction of the joint's effort limit.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub effort_noise_of_limit: f64,
-    /// Step of the effort; 0 for none \[N m\].
+    /// Quantisation step of the effort; 0 for none \[N m\].
     #[schemars(range(min = 0.0))]
     pub effort_step_nm: f64,
-    /// By joint, what the torque sensor multiplies the effort by.
+    /// Gain of the torque sensor, by joint; by default 1.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub effort_gain: BTreeMap<String, f64>,
-    /// By joint, what the torque sensor adds to the effort \[N m\].
+    /// Offset of the torque sensor, by joint; by default 0 \[N m\].
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub effort_bias_nm: BTreeMap<String, f64>,
 }
@@ -174,25 +174,25 @@ impl Default for Sensors {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RecordingSpec {
-    /// Its name: the file is `<name>.mcap`.
+    /// Name of the recording; its file is `<name>.mcap`.
     #[schemars(regex(pattern = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"))]
     pub name: String,
-    /// What it is for.
+    /// Purpose of the recording.
     #[serde(default)]
     pub role: Role,
-    /// How long it lasts \[s\].
+    /// Duration \[s\].
     #[schemars(range(min = 0.01, max = 1_000_000.0))]
     pub duration_s: f64,
-    /// How the arm moves.
+    /// Motion of the arm.
     pub motion: MotionSpec,
-    /// When somebody asks the detectors to learn the arm's usual behaviour anew \[s\]: `std_msgs/msg/Bool` on
-    /// `/learn`.
+    /// Times at which the detectors are asked to relearn the arm's baseline behaviour, by a
+    /// `std_msgs/msg/Bool` on `/learn` \[s from the start of the recording\].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub learn_at_s: Vec<f64>,
     /// Pushes at chosen times.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contacts: Vec<ContactSpec>,
-    /// What stands in the way.
+    /// Obstacles in the way of the arm.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub obstacles: Vec<ObstacleSpec>,
     /// Pushes at random times.
@@ -200,15 +200,15 @@ pub struct RecordingSpec {
     pub hands: Option<HandsSpec>,
 }
 
-/// What a recording is for.
+/// Purpose of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// To learn from.
+    /// Training.
     #[default]
     Train,
-    /// To choose thresholds on.
+    /// Choice of thresholds.
     Validation,
-    /// To be judged on.
+    /// Evaluation.
     Test,
 }

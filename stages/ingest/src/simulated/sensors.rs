@@ -1,4 +1,4 @@
-//! From what the arm does to what is published of it.
+//! Sensors of the arm: from its true state to the published values.
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,4 +1,4 @@
-//! One recording of a simulated cell, instant by instant.
+//! Simulation of one recording of a cell, instant by instant.
 
 use tauscope_bus::JointArray;
 use tauscope_dynamics::Model;
@@ -15,17 +15,17 @@ use super::scenario::{ContactKind, LabelSpec, Scenario};
 use super::sensors::SensorBank;
 use super::trajectory::{JointRange, Target, Trajectory};
 
-/// The controller runs at 1 kHz.
+/// Number of plant steps per control step, for a controller at 1 kHz.
 /// Physical: 1 kHz is the usual rate of a torque-controlled arm, e.g. Franka's control interface.
 const STEPS_PER_CONTROL: i64 = 4;
-/// Faster than this and the arm has run away \[rad/s or m/s\].
+/// Velocity above which the arm is treated as unstable \[rad/s or m/s\].
 /// Physical: about 30 times the highest joint speed of common arms.
 const RUNAWAY: f64 = 100.0;
 
-/// What the cell publishes at one instant.
+/// Values that the cell publishes at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// \[ns since the epoch\]
+    /// Stamp \[ns since the epoch\].
     pub stamp_ns: i64,
     /// Measured position \[rad\].
     pub position: JointArray,
@@ -37,40 +37,39 @@ pub struct Reading {
     pub command_position: JointArray,
     /// Whether something touches the arm.
     pub contact: bool,
-    /// Whether somebody has asked for learning since the reading before.
+    /// Whether learning was requested since the previous reading.
     pub learn: bool,
 }
 
-/// A contact as the labels tell of it.
+/// A contact as described in the labels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
-    /// When it begins \[s from the first reading\].
+    /// Begin \[s from the first reading\].
     pub on_s: f64,
-    /// When it has ended \[s from the first reading\].
+    /// End \[s from the first reading\].
     pub off_s: f64,
-    /// What it is called.
+    /// Kind of contact.
     pub kind: ContactKind,
     /// The link that is touched.
     pub link: String,
-    /// Where, at its peak, in the world frame \[m\].
+    /// Point of contact at its peak, world frame \[m\].
     pub point_m: [f64; 3],
     /// Force on the robot at its peak, world frame \[N\].
     pub force_n: [f64; 3],
-    /// The joints between the base and the link, and the torque that the force does in each of them at
-    /// its peak, `Jᵀ F` \[N m\].
+    /// The joints between the base and the link, each with the torque of the peak force, `Jᵀ F` \[N m\].
     pub joints: Vec<(String, f64)>,
-    /// What else is said of it.
+    /// Further labels.
     pub label: LabelSpec,
 }
 
 impl Event {
-    /// Size of its force \[N\].
+    /// Returns the magnitude of its peak force \[N\].
     pub fn peak_n(&self) -> f64 {
         self.force_n.iter().map(|f| f * f).sum::<f64>().sqrt()
     }
 }
 
-/// A recording in the making.
+/// The simulation of one recording.
 #[derive(Debug)]
 pub struct Simulation {
     name: String,
@@ -91,15 +90,15 @@ pub struct Simulation {
     /// The force of each obstacle in this step.
     touches: Vec<Option<Contact>>,
     events: Vec<Event>,
-    /// Times at which somebody asks for learning \[s\], ascending.
+    /// Times at which learning is requested \[s\], ascending.
     learn_at_s: std::iter::Peekable<std::vec::IntoIter<f64>>,
 }
 
 impl Simulation {
-    /// The recording with this place in the scenario, of the robot that it names.
+    /// Creates the simulation of the scenario's recording `index`; `model` is the robot that the scenario names.
     ///
     /// # Errors
-    /// If the scenario does not fit the robot, or asks for what cannot be.
+    /// If the scenario does not fit the robot, or cannot be simulated.
     pub fn new(scenario: &Scenario, model: &Model, index: usize) -> Result<Self, ScenarioError> {
         let (scenario, _) = conceal::add(scenario, model)?;
         let spec = &scenario.recordings[index];
@@ -142,7 +141,7 @@ impl Simulation {
         })
     }
 
-    /// The next instant that is published; `None` at the end.
+    /// Simulates up to the next published instant; returns `None` at the end.
     ///
     /// # Errors
     /// [`ScenarioError::Unstable`] if the arm runs away.
@@ -159,7 +158,7 @@ impl Simulation {
             let due = (self.step >= self.next_sample).then(|| self.read(time_s));
             self.advance(time_s)?;
             if let Some(mut reading) = due {
-                // What moves the arm on from here is the effort here.
+                // The effort at this instant is the one that drives the step from here.
                 let efforts_nm = self.record.effort_nm();
                 reading.effort = self.sensors.measure_effort(efforts_nm);
                 return Ok(Some(reading));
@@ -170,18 +169,18 @@ impl Simulation {
         Ok(None)
     }
 
-    /// The pushes that have passed their peak so far, and the obstacles that were run into and left; at
-    /// the end also those that are still touched.
+    /// Returns the pushes that have passed their peak so far, and the contacts with obstacles that have ended; at
+    /// the end also the contacts in progress.
     pub fn events(&self) -> &[Event] {
         &self.events
     }
 
-    /// Length of a cycle of the motion \[s\], if it repeats itself exactly.
+    /// Returns the length of a cycle of the motion \[s\], if it repeats itself exactly.
     pub fn cycle_s(&self) -> Option<f64> {
         self.trajectory.cycle_s()
     }
 
-    /// How much of the recording has been made, 0 to 1.
+    /// Returns the completed fraction of the recording, 0 to 1.
     pub fn fraction_done(&self) -> f64 {
         (self.step as f64 / self.last_step as f64).min(1.0)
     }
@@ -190,7 +189,7 @@ impl Simulation {
         (self.step * STEP_NS) as f64 * 1e-9
     }
 
-    /// What there is to read now but for the effort.
+    /// Measures everything but the effort.
     fn read(&mut self, time_s: f64) -> Reading {
         // The instants of the rate, each moved to the next step of the plant.
         let index = (time_s * self.rate_hz + 1e-6).floor() + 1.0;
@@ -214,7 +213,7 @@ impl Simulation {
         }
     }
 
-    /// Moves the plant on by one step.
+    /// Advances the plant by one step.
     fn advance(&mut self, time_s: f64) -> Result<(), ScenarioError> {
         let n = self.joints.len();
         for (touch, obstacle) in self.touches.iter_mut().zip(&self.obstacles) {

@@ -12,7 +12,7 @@ use crate::error::IngestError;
 use crate::pack::{PackSettings, Packer};
 use crate::setup::Setup;
 
-/// A source that simulates one recording of a scenario as it is asked for samples.
+/// A source that simulates one recording of a scenario on demand.
 #[derive(Debug)]
 pub struct SimulatedCell {
     simulation: Simulation,
@@ -21,7 +21,7 @@ pub struct SimulatedCell {
 }
 
 impl SimulatedCell {
-    /// The recording `name` of the scenario, or its first, of the robot that the scenario names.
+    /// Creates the source of the scenario's recording `name`, or of its first; `model` is the robot that it names.
     ///
     /// # Errors
     /// If there is no such recording, or the scenario does not fit the robot.

@@ -1,4 +1,4 @@
-//! The motion that the controller is told to make.
+//! Reference motion of the controller.
 
 mod fourier;
 mod points;
@@ -12,17 +12,17 @@ pub(super) use points::Points;
 pub(super) use spline::Spline;
 pub(super) use teach::Allowed;
 
-/// What a joint can do, for those who plan its motion.
+/// Limits of a joint, for the planning of its motion.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct JointRange {
     pub name: String,
-    /// \[rad or m\].
+    /// Lower limit \[rad or m\].
     pub lower: f64,
-    /// \[rad or m\].
+    /// Upper limit \[rad or m\].
     pub upper: f64,
-    /// \[rad/s or m/s\].
+    /// Velocity limit \[rad/s or m/s\].
     pub velocity: f64,
-    /// \[N m or N\].
+    /// Effort limit \[N m or N\].
     pub effort: f64,
 }
 
@@ -37,30 +37,30 @@ impl JointRange {
     }
 }
 
-/// Where the arm should be at an instant.
+/// Reference of the joints at an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Target {
-    /// \[rad\].
+    /// Position \[rad\].
     pub position: JointArray,
-    /// \[rad/s\].
+    /// Velocity \[rad/s\].
     pub velocity: JointArray,
-    /// \[rad/s²\].
+    /// Acceleration \[rad/s²\].
     pub acceleration: JointArray,
 }
 
-/// A motion, known at any time from its start on. Asked with times that do not decrease.
+/// A motion from its start on, evaluated at times that do not decrease.
 #[derive(Debug)]
 pub(super) enum Trajectory {
-    /// From point to point.
+    /// Motion from point to point.
     Points(Box<Points>),
     /// Periodic excitation.
     Fourier(Fourier),
-    /// Through the rows of a recording.
+    /// Spline through the rows of a recording.
     Spline(Spline),
 }
 
 impl Trajectory {
-    /// Where the arm should be `t_s` seconds from the start.
+    /// Returns the reference `t_s` seconds from the start.
     pub fn at(&mut self, t_s: f64) -> Target {
         match self {
             Self::Points(points) => points.at(t_s),
@@ -69,7 +69,7 @@ impl Trajectory {
         }
     }
 
-    /// Length of a cycle \[s\], of a motion that goes through points again and again.
+    /// Returns the length of a cycle \[s\], for a motion that visits its points repeatedly.
     pub fn cycle_s(&self) -> Option<f64> {
         match self {
             Self::Points(points) => points.cycle_s(),
@@ -78,8 +78,8 @@ impl Trajectory {
     }
 }
 
-/// The quintic polynomial from 0 to 1 with velocity and acceleration zero at both ends, its first and
-/// second derivative, at `u` from 0 to 1: the path of least jerk (Flash and Hogan 1985).
+/// Evaluates the quintic polynomial from 0 to 1 with zero velocity and acceleration at both ends, and its
+/// first and second derivative, at `u` from 0 to 1: the path of minimum jerk (Flash and Hogan 1985).
 fn quintic(u: f64) -> [f64; 3] {
     let u = u.clamp(0.0, 1.0);
     let (u2, u3) = (u * u, u * u * u);
@@ -93,7 +93,7 @@ fn quintic(u: f64) -> [f64; 3] {
 /// Largest value of the quintic's first derivative, at its middle.
 /// Physical: 30 u² (1 - u)² at u = ½ is 15/8.
 const QUINTIC_PEAK_VELOCITY: f64 = 1.875;
-/// Largest value of its second, 10/√3.
+/// Largest value of the quintic's second derivative, 10/√3.
 /// Physical: 60 u (1 - 3 u + 2 u²) at u = (3 - √3) / 6 is 10/√3.
 const QUINTIC_PEAK_ACCELERATION: f64 = 5.773_502_691_896_258;
 

@@ -1,4 +1,4 @@
-//! Makes a scenario's recordings.
+//! Writes a scenario's recordings.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,25 +14,26 @@ use super::messages::CellMessages;
 use super::scenario::Scenario;
 use super::simulation::Simulation;
 
-/// What [`simulate`] has made.
+/// Files written by [`simulate`].
 #[derive(Debug)]
 pub struct Simulated {
     /// The recordings, in the scenario's order.
     pub recordings: Vec<Written>,
-    /// Where the labels are.
+    /// Path of the labels.
     pub labels_path: PathBuf,
     /// The labels themselves.
     pub labels: Labels,
-    /// Where it is written what was concealed, for a scenario that conceals.
+    /// Path of the file with the concealed effects, for a scenario that conceals any.
     pub concealed_path: Option<PathBuf>,
 }
 
-/// Makes every recording of the scenario in the folder `out`, `<name>.mcap` each with
-/// `/joint_states`, `/joint_commands` and `/contact` (and `/learn` where somebody asks), and `labels.json`; and, for a scenario that
-/// conceals, what it conceals as `concealed.json`.
+/// Simulates all recordings of the scenario and writes them to the folder `out`.
 ///
-/// `provenance` is written into each file; `progress` is told how much is done, from 0 to 1, and by
-/// returning `false` ends the work: `None` comes back then, and the recording at hand stays a `.part`.
+/// Each `<name>.mcap` has the topics `/joint_states`, `/joint_commands` and `/contact`, and `/learn` if learning is
+/// requested. The labels are written to `labels.json`, the effects that a scenario conceals to `concealed.json`.
+///
+/// `provenance` is written into each file. `progress` receives the completed fraction, from 0 to 1, and aborts
+/// the work by returning `false`. The result is `None` then, and the current recording remains a `.part` file.
 ///
 /// # Errors
 /// If the scenario does not fit the robot, the arm runs away, or a file cannot be written.
@@ -46,7 +47,7 @@ pub fn simulate(
     check_names(scenario)?;
     let (open, concealed) = conceal::add(scenario, model)?;
     let scenario = &*open;
-    // Everything is tried before anything is written.
+    // An error in any recording must show before anything is written.
     let simulations = (0..scenario.recordings.len())
         .map(|index| Simulation::new(scenario, model, index))
         .collect::<Result<Vec<_>, _>>()?;
@@ -92,7 +93,7 @@ pub fn simulate(
     }))
 }
 
-/// Writes a file whole or not at all.
+/// Writes a file atomically.
 fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), ScenarioError> {
     let unwritable = |source: std::io::Error| ScenarioError::Labels {
         path: path.to_owned(),
@@ -103,7 +104,7 @@ fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), Scenario
     whole_file::write(path, text, Existing::Replace).map_err(unwritable)
 }
 
-/// Each recording has a name of its own.
+/// Checks that the recordings have distinct names.
 fn check_names(scenario: &Scenario) -> Result<(), ScenarioError> {
     for (index, spec) in scenario.recordings.iter().enumerate() {
         if scenario.recordings[..index]
@@ -120,7 +121,7 @@ fn check_names(scenario: &Scenario) -> Result<(), ScenarioError> {
     Ok(())
 }
 
-/// Writes one recording; `None` if it was broken off.
+/// Writes one recording; returns `None` if it was aborted.
 fn write(
     path: &Path,
     mut messages: CellMessages,
@@ -137,7 +138,7 @@ fn write(
         messages.fill(&reading);
         let ns = reading.stamp_ns;
         if messages.learn.data {
-            // Before the state from which on it holds.
+            // Before the state from which it takes effect.
             let topic = match requests {
                 Some(topic) => topic,
                 None => *requests.insert(writer.add_topic::<ros::Bool>("/learn")?),

@@ -1,16 +1,16 @@
-//! The controller's clock, which counts from its start, on ours. Pure.
+//! Conversion of the controller's clock, which counts from its start, to the host's clock. Pure.
 
-/// A clock that steps by more than this was set, or its controller was started again \[ns\].
+/// Step of the clock above which it is treated as set, or its controller as restarted \[ns\].
 /// Physical: far above the delay of a network, far below the time that a controller takes to start.
 const STEP_NS: i64 = 1_000_000_000;
-/// Longer times since a controller's start are none \[s\].
+/// Longest plausible time since a controller's start \[s\].
 /// Physical: 30 years.
 const LONGEST_S: f64 = 1e9;
 
-/// Stamps packages, and counts those that the controller left out.
+/// Stamps packages, and counts missing ones.
 #[derive(Debug)]
 pub(super) struct Clock {
-    /// From the controller's time to ours \[ns\].
+    /// Offset from the controller's time to the host's \[ns\].
     offset_ns: Option<i64>,
     connection: u64,
     newest_ns: i64,
@@ -20,7 +20,7 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// For packages at this rate.
+    /// Creates a clock for packages at this rate.
     pub fn new(rate_hz: f64) -> Self {
         Self {
             offset_ns: None,
@@ -32,14 +32,14 @@ impl Clock {
         }
     }
 
-    /// Packages that should have come between others. Those of an interruption are among them, unless the controller
-    /// was started again.
+    /// Returns the number of packages missing between others. It includes those of an interruption, unless the
+    /// controller was restarted.
     pub fn lost(&self) -> u64 {
         self.lost
     }
 
-    /// The stamp \[ns since the epoch\] of a package that was received on this connection. Differences of stamps are
-    /// those of the controller's clock. `None` if it tells no time.
+    /// Returns the stamp \[ns since the epoch\] of a package received on this connection; `None` if its time is
+    /// invalid. Differences of stamps are those of the controller's clock.
     pub fn stamp(&mut self, timestamp_s: f64, received_ns: i64, connection: u64) -> Option<i64> {
         if !(0.0..LONGEST_S).contains(&timestamp_s) {
             return None;
@@ -50,7 +50,7 @@ impl Clock {
             Some(offset_ns) if time_ns < self.newest_ns - STEP_NS => {
                 tracing::warn!("the controller's clock was set back: it was started again");
                 self.newest_ns = time_ns;
-                // A new connection may have found it out before.
+                // A new connection may have corrected the offset already.
                 if (offset_ns - anew).abs() > STEP_NS {
                     anew
                 } else {
@@ -77,8 +77,8 @@ impl Clock {
         Some(time_ns + offset_ns)
     }
 
-    /// Counts what is missing before this package. A controller that is slower than asked sends at its own rate, which
-    /// shows in the shortest step.
+    /// Counts the packages missing before this one. A controller that is slower than requested sends at its own rate,
+    /// which is that of the shortest step.
     fn count(&mut self, time_ns: i64) {
         let step_ns = time_ns - self.newest_ns;
         if step_ns <= 0 {
@@ -87,7 +87,7 @@ impl Clock {
         self.newest_ns = time_ns;
         let shortest_ns = self.shortest_ns.map_or(step_ns, |ns| ns.min(step_ns));
         self.shortest_ns = Some(shortest_ns);
-        // Half a period more: stamps are rounded.
+        // Tolerance of a tenth of a period: stamps are rounded.
         let period_ns = self.period_ns.max(shortest_ns);
         let periods = (step_ns + period_ns / 10) / period_ns;
         self.lost += u64::try_from(periods - 1).unwrap_or(0);
@@ -105,14 +105,14 @@ mod tests {
         let mut clock = Clock::new(500.0);
         let first = clock.stamp(100.0, EPOCH_NS, 1);
         assert_eq!(first, Some(EPOCH_NS));
-        // Received late, and not stamped late.
+        // A late reception does not make the stamp late.
         let late = clock.stamp(100.002, EPOCH_NS + 30_000_000, 1);
         assert_eq!(late, Some(EPOCH_NS + 2_000_000));
         assert_eq!(clock.lost(), 0);
         let after_a_hole = clock.stamp(100.010, EPOCH_NS + 31_000_000, 1);
         assert_eq!(after_a_hole, Some(EPOCH_NS + 10_000_000));
         assert_eq!(clock.lost(), 3);
-        // The same controller on another connection goes on.
+        // A new connection to the same controller continues its time.
         let again = clock.stamp(101.010, EPOCH_NS + 1_010_000_000, 2);
         assert_eq!(again, Some(EPOCH_NS + 1_010_000_000));
         assert_eq!(clock.lost(), 502);

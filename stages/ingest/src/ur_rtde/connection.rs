@@ -1,5 +1,5 @@
-//! The thread that talks to a controller: connects, agrees on a recipe, and puts packages into the queue. It begins
-//! again after every fault, for ever.
+//! The thread that communicates with a controller: it connects, agrees on a recipe, and puts packages into the queue.
+//! It reconnects after every fault, without limit.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
@@ -15,47 +15,47 @@ use crate::config::UrRtdeConfig;
 use crate::queue::Queue;
 use crate::tcp;
 
-/// How long a controller may take to accept a connection, to answer, or between two packages of data.
+/// Timeout for accepting a connection, for an answer, and between two packages of data.
 /// Physical: a controller answers within milliseconds; a busy one skips some packages, not seconds.
 const PATIENCE: Duration = Duration::from_millis(1500);
-/// How long a read waits; how soon a stop is noticed.
+/// Timeout of a read, which bounds the latency of a stop.
 const READ_FOR: Duration = Duration::from_millis(100);
-/// The first pause between two attempts, doubled each time.
+/// First pause between two attempts to connect; doubled after each failed one up to [`LONGEST_PAUSE`].
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
-/// The longest pause.
+/// Longest pause between two attempts to connect.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
-/// The version of the protocol that is spoken.
+/// Version of the protocol.
 const PROTOCOL: u16 = 2;
 
 /// A package of data.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Data {
-    /// When it was received \[ns since the epoch\].
+    /// Time of reception \[ns since the epoch\].
     pub received_ns: i64,
-    /// The number of the connection, from 1.
+    /// Number of the connection, from 1.
     pub connection: u64,
-    /// Its numbers.
+    /// Values of its fields.
     pub numbers: Numbers,
-    /// Whether the inertia of the payload is among them.
+    /// Whether they include the inertia of the payload.
     pub has_inertia: bool,
 }
 
-/// What the thread and the source share.
+/// State shared by the thread and the source.
 #[derive(Debug)]
 pub(super) struct Shared {
-    /// Packages that wait.
+    /// Packages that wait for the source.
     pub queue: Queue<Data>,
     fault: Mutex<Option<Fault>>,
     stop: AtomicBool,
 }
 
 impl Shared {
-    /// Why there are no packages, if that is known.
+    /// Returns the reason why there are no packages, if known.
     pub fn fault(&self) -> Option<Fault> {
         self.lock().clone()
     }
 
-    /// Ends the thread, soon.
+    /// Requests the thread to end.
     pub fn stop(&self) {
         self.stop.store(true, Ordering::Relaxed);
     }
@@ -64,7 +64,7 @@ impl Shared {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Nothing in here can be left half done, so a panic elsewhere does not matter.
+    /// Locks the fault, even if poisoned: no operation on it can be left half done.
     fn lock(&self) -> MutexGuard<'_, Option<Fault>> {
         self.fault.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -73,7 +73,7 @@ impl Shared {
 /// Starts the thread.
 ///
 /// # Errors
-/// If the system has no thread left.
+/// If the system cannot start a thread.
 pub(super) fn start(settings: &UrRtdeConfig) -> std::io::Result<Arc<Shared>> {
     let shared = Arc::new(Shared {
         queue: Queue::new(settings.queue),
@@ -109,7 +109,7 @@ fn talk(settings: &UrRtdeConfig, shared: &Shared) {
     }
 }
 
-/// One connection, from its beginning to its fault, or to the stop.
+/// Runs one connection until its fault or the stop.
 fn session(
     settings: &UrRtdeConfig,
     shared: &Shared,
@@ -138,7 +138,7 @@ fn session(
     Ok(())
 }
 
-/// Agrees with the controller on what it sends, and lets it begin; `None` at the stop.
+/// Agrees with the controller on its outputs and starts it; returns `None` at the stop.
 fn agree(settings: &UrRtdeConfig, peer: &mut Peer<'_>) -> Result<Option<Recipe>, Fault> {
     let unanswered = Fault::Unanswered("the request for a protocol version");
     let Some(answer) = peer.ask(VERSION, &PROTOCOL.to_be_bytes(), unanswered)? else {
@@ -202,7 +202,8 @@ impl<'a> Peer<'a> {
         self.next(letter, silent)
     }
 
-    /// The body of the next package with this letter; `None` at the stop. Others are passed over, texts are told.
+    /// Returns the body of the next package with this letter; `None` at the stop. Logs texts and skips other
+    /// packages.
     fn next(&mut self, wanted: u8, silent: Fault) -> Result<Option<Vec<u8>>, Fault> {
         let mut buffer = [0; 4096];
         let deadline = Instant::now() + PATIENCE;
@@ -239,7 +240,7 @@ fn closed(error: std::io::Error) -> Fault {
     Fault::Closed(error.to_string())
 }
 
-/// The present on the clock of reception.
+/// Returns the current time on the clock of reception.
 pub(super) fn now_ns() -> i64 {
     SystemTime::now()
         .duration_since(SystemTime::UNIX_EPOCH)

@@ -1,4 +1,4 @@
-//! Why a controller gives nothing that can be used, and what would help. Pure.
+//! Faults of the connection to a controller, with their remedies. Pure.
 
 use tauscope_bus::Trouble;
 
@@ -6,33 +6,33 @@ use super::field::{Field, Part, fields};
 use crate::config::UrRtdeConfig;
 use crate::tcp::Unreachable;
 
-/// What ended a connection, or kept it from beginning.
+/// Faults that end or prevent a connection.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Fault {
-    /// There is no connection.
+    /// No connection.
     Unreachable(Unreachable),
-    /// It does not answer this request.
+    /// No answer to this request.
     Unanswered(&'static str),
-    /// Its bytes are no packages of RTDE.
+    /// Bytes that are not packages of RTDE.
     Nonsense(Vec<u8>),
-    /// It does not speak version 2.
+    /// No support of protocol version 2.
     Version,
-    /// It does not have these outputs.
+    /// Outputs that the controller does not have.
     NotFound(Vec<Field>),
-    /// Its answer to the recipe makes no sense.
+    /// An invalid answer to the request for outputs.
     Recipe(String),
-    /// It refuses to begin.
+    /// A refused start.
     NotStarted,
-    /// It has agreed to begin and sends nothing.
+    /// No data after an accepted start.
     Silent,
-    /// Its data are not those of the recipe.
+    /// Data that do not match the recipe.
     Data(String),
-    /// It closed the connection, or the network did.
+    /// A connection closed by the controller or the network.
     Closed(String),
 }
 
 impl Fault {
-    /// In words, with the remedy; `was_well` if there were samples before.
+    /// Describes the fault with its remedy; `was_well` if there were samples before.
     pub fn trouble(&self, settings: &UrRtdeConfig, was_well: bool) -> Trouble {
         let address = settings.address();
         let lost = if was_well {
@@ -105,7 +105,7 @@ fn names(fields: &[Field]) -> String {
     names.join(", ")
 }
 
-/// What helps against outputs that are not there.
+/// Returns the remedy for missing outputs.
 fn without(missing: &[Field]) -> String {
     let of = |part: Part| match part {
         Part::Effort => Some("set `effort: actual_current` and `effort_unit: A`"),

@@ -1,13 +1,13 @@
-//! The outputs of a controller that are read. Pure.
+//! Outputs read from a controller. Pure.
 
 use crate::config::UrRtdeConfig;
 
-/// Joints of the arm; the interface has vectors of this length.
+/// Number of joints of the arm, and length of the interface's vectors.
 pub(super) const JOINTS: usize = 6;
-/// What RTDE tells of the tool: its mass, its centre of mass and its inertia.
+/// RTDE outputs of the payload: its mass, its centre of mass and its inertia.
 const PAYLOAD: &str = "payload payload_cog payload_inertia";
 
-/// What a field is for.
+/// Quantity that a field supplies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     Timestamp,
@@ -32,7 +32,7 @@ impl Part {
         Self::Inertia,
     ];
 
-    /// Its type in RTDE, and how many numbers of 64 bits that is.
+    /// Returns its type in RTDE, and the number of 64-bit values in it.
     pub fn type_name(self) -> (&'static str, usize) {
         match self {
             Self::Timestamp | Self::Mass => ("DOUBLE", 1),
@@ -41,7 +41,7 @@ impl Part {
         }
     }
 
-    /// Its place among the [`Numbers`].
+    /// Returns its range in the [`Numbers`](super::recipe::Numbers).
     pub fn place(self) -> std::ops::Range<usize> {
         let before = Self::ALL.iter().take_while(|part| **part != self);
         let from: usize = before.map(|part| part.type_name().1).sum();
@@ -49,16 +49,16 @@ impl Part {
     }
 }
 
-/// An output that is asked for.
+/// A requested output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Field {
-    /// What it is for.
+    /// Quantity that it supplies.
     pub part: Part,
     /// Its name in RTDE.
     pub name: &'static str,
 }
 
-/// The outputs that these settings need. The inertia of the payload is left out where a controller has none.
+/// Returns the outputs that these settings need; `with_inertia` is false for a controller without a payload inertia.
 pub(super) fn fields(settings: &UrRtdeConfig, with_inertia: bool) -> Vec<Field> {
     let field = |part, name| Field { part, name };
     let mut fields = vec![

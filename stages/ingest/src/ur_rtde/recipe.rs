@@ -1,16 +1,16 @@
-//! What a controller agrees to send, and where each stands in a package of data. Pure.
+//! The recipe: outputs that a controller agrees to send, and their order in a package of data. Pure.
 
 use super::fault::Fault;
 use super::field::{Field, Part};
 
-/// Numbers of the longest recipe.
+/// Number of values in the longest recipe.
 const MAX_NUMBERS: usize = 35;
 const NOT_FOUND: &str = "NOT_FOUND";
 
-/// The numbers of a package, in the order of [`Part::ALL`]; what was not asked for is 0.
+/// Values of a package, in the order of [`Part::ALL`]; 0 for outputs that were not requested.
 pub(super) type Numbers = [f64; MAX_NUMBERS];
 
-/// The body of the request for these fields.
+/// Returns the body of the request for these fields.
 pub(super) fn request(fields: &[Field], rate_hz: f64) -> Vec<u8> {
     let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
     let mut body = rate_hz.to_be_bytes().to_vec();
@@ -18,7 +18,7 @@ pub(super) fn request(fields: &[Field], rate_hz: f64) -> Vec<u8> {
     body
 }
 
-/// What a controller has agreed to send.
+/// Outputs that a controller has agreed to send.
 #[derive(Debug)]
 pub(super) struct Recipe {
     id: u8,
@@ -26,11 +26,11 @@ pub(super) struct Recipe {
 }
 
 impl Recipe {
-    /// From a controller's answer: the number of the recipe, and the types of its fields.
+    /// Parses a controller's answer: the number of the recipe, and the types of its fields.
     ///
     /// # Errors
-    /// [`Fault::NotFound`] with all fields that the controller does not have; [`Fault::Recipe`] if it has them as
-    /// something else.
+    /// [`Fault::NotFound`] with all fields that the controller does not have; [`Fault::Recipe`] if a field has
+    /// another type.
     pub fn agreed(answer: &[u8], fields: Vec<Field>) -> Result<Self, Fault> {
         let (&id, types) = answer
             .split_first()
@@ -57,12 +57,12 @@ impl Recipe {
         Ok(Self { id, fields })
     }
 
-    /// Whether it has this part.
+    /// Whether it includes this quantity.
     pub fn has(&self, part: Part) -> bool {
         self.fields.iter().any(|field| field.part == part)
     }
 
-    /// The numbers of a package of data.
+    /// Returns the values of a package of data.
     ///
     /// # Errors
     /// [`Fault::Data`] if it is of another recipe, or of another length.

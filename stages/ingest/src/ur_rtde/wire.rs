@@ -1,4 +1,4 @@
-//! Packages of RTDE: a big-endian length of 16 bits that counts itself, a letter, and the rest. Pure.
+//! Packages of RTDE: a big-endian length of 16 bits that includes itself, a letter, and the body. Pure.
 //!
 //! Universal Robots, "Real-Time Data Exchange (RTDE) Guide", protocol version 2.
 
@@ -6,24 +6,24 @@
 pub(super) const VERSION: u8 = b'V';
 /// Letter of a recipe of outputs, and of its answer.
 pub(super) const OUTPUTS: u8 = b'O';
-/// Letter of the request to begin, and of its answer.
+/// Letter of the request to start, and of its answer.
 pub(super) const START: u8 = b'S';
 /// Letter of a package of data.
 pub(super) const DATA: u8 = b'U';
-/// Letter of a text for people.
+/// Letter of a text message.
 pub(super) const TEXT: u8 = b'M';
 /// All letters of the protocol.
 const LETTERS: &[u8] = b"VvMUOISPR";
 const HEADER_BYTES: usize = 3;
 
-/// Bytes that are no package.
+/// Bytes that are not a package.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Nonsense {
-    /// How they begin.
+    /// The first bytes.
     pub beginning: Vec<u8>,
 }
 
-/// A package with this letter. Requests are far shorter than the format can say.
+/// Returns a package with this letter. Requests are far shorter than the format allows.
 pub(super) fn package(letter: u8, body: &[u8]) -> Vec<u8> {
     let len = u16::try_from(HEADER_BYTES + body.len()).unwrap_or(u16::MAX);
     let mut bytes = len.to_be_bytes().to_vec();
@@ -32,22 +32,22 @@ pub(super) fn package(letter: u8, body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Cuts a stream of bytes into packages. It holds at most one package and what was read behind it.
+/// Splits a stream of bytes into packages. It holds at most one package and the bytes read after it.
 #[derive(Debug, Default)]
 pub(super) struct Packages {
     bytes: Vec<u8>,
 }
 
 impl Packages {
-    /// Adds what was read.
+    /// Adds received bytes.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// Takes the next whole package: its letter and its body.
+    /// Takes the next complete package: its letter and its body.
     ///
     /// # Errors
-    /// If the bytes are of another protocol; nothing of them can be read then.
+    /// If the bytes belong to another protocol; the stream cannot be read any further.
     pub fn take(&mut self) -> Result<Option<(u8, Vec<u8>)>, Nonsense> {
         let Some(&[high, low, letter]) = self.bytes.first_chunk::<HEADER_BYTES>() else {
             return Ok(None);
@@ -67,7 +67,7 @@ impl Packages {
     }
 }
 
-/// The text of a package for people: its length, itself, and who sent it.
+/// Returns the text of a text message, whose body is the length, the text, and the sender.
 pub(super) fn text(body: &[u8]) -> String {
     let len = body.first().map_or(0, |&len| usize::from(len));
     let text = body.get(1..).unwrap_or_default();

@@ -1,15 +1,15 @@
-//! What `rmw_zenoh` attaches to each message, and what can be seen from it: lost messages.
+//! Attachments of `rmw_zenoh` to its messages, from whose sequence numbers lost messages are counted.
 
 use std::collections::BTreeMap;
 
 use super::waiting::Role;
 
-/// Publishers that are remembered; a node that is started again comes with another id.
+/// Maximum number of publishers remembered; a restarted node has another id.
 /// Resolution: memory.
 const MAX_PUBLISHERS: usize = 256;
 
-/// Number, time and publisher of a message: little-endian i64 sequence, i64 source time \[ns\], the
-/// length 16, and 16 bytes of publisher id.
+/// Sequence number and publisher of a message. The bytes are a little-endian i64 sequence number, an i64
+/// source time \[ns\], the length 16, and 16 bytes of publisher id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Attachment {
     pub sequence: i64,
@@ -17,7 +17,7 @@ pub(super) struct Attachment {
 }
 
 impl Attachment {
-    /// `None` if these bytes are something else.
+    /// Parses an attachment; returns `None` if the bytes are something else.
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         let (sequence, rest) = bytes.split_first_chunk::<8>()?;
         let (_source_time, rest) = rest.split_first_chunk::<8>()?;
@@ -31,7 +31,7 @@ impl Attachment {
     }
 }
 
-/// Counts the holes in the publishers' numbers.
+/// Counts the gaps in the publishers' sequence numbers.
 #[derive(Debug, Default)]
 pub(super) struct Losses {
     next: BTreeMap<(Role, [u8; 16]), i64>,
@@ -39,7 +39,7 @@ pub(super) struct Losses {
 }
 
 impl Losses {
-    /// Takes note of a message. Numbers that run backwards are a publisher's new beginning.
+    /// Records a message. Numbers that decrease mean a restarted publisher.
     pub fn count(&mut self, role: Role, attachment: Attachment) {
         let key = (role, attachment.publisher);
         if !self.next.contains_key(&key) && self.next.len() >= MAX_PUBLISHERS {

@@ -1,4 +1,5 @@
-//! From what was waited for, what came and what was seen to the likeliest slip. Pure.
+//! Diagnosis of a source without usable messages: compares the expected, the received and the observed messages to
+//! find the likeliest mistake. Pure.
 
 use tauscope_archive::Twice;
 use tauscope_archive::ros::JointStateType;
@@ -10,43 +11,46 @@ use super::publication::{Form, Publication};
 use super::scout::Seen;
 use crate::config::Keys;
 
-/// Topics that are less alike than this (Jaro-Winkler, 0 to 1) were not meant.
+/// Smallest similarity of names (Jaro-Winkler, 0 to 1) at which another topic was probably meant.
 const LEAST_SIMILARITY: f64 = 0.85;
 
-/// What a source waits for.
+/// Topic, joints and endpoints that a source expects.
 #[derive(Debug, Clone)]
 pub(super) struct Expected {
     pub scheme: KeyScheme,
-    /// The topic as it stands in the pipeline file.
+    /// The topic in the pipeline file.
     pub topic: String,
     pub joints: Vec<String>,
     pub connect: Vec<String>,
     pub listen: Vec<String>,
 }
 
-/// What came on the topic since the last sample.
+/// Messages received on the topic since the last sample.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Fed {
-    /// There were samples before.
+    /// Whether there were samples before.
     pub was_well: bool,
-    /// Messages of the topic.
+    /// Number of messages on the topic.
     pub messages: u64,
     pub undecodable: u64,
-    /// Why the last one could not be read.
+    /// Reason why the last message could not be decoded.
     pub reason: Option<String>,
-    /// Messages of other joints, without positions, not finite, with stamps that do not advance.
+    /// Messages of other joints.
     pub foreign: u64,
+    /// Messages without positions.
     pub incomplete: u64,
+    /// Messages with values that are not finite.
     pub not_finite: u64,
-    /// A joint and the field of it that came and was never finite.
+    /// A joint, and its field that was never finite.
     pub never_finite: Option<(String, &'static str)>,
     /// A joint that messages name more than once.
     pub twice: Option<Twice>,
+    /// Messages with stamps that do not advance.
     pub stale: u64,
 }
 
 impl Expected {
-    /// The key without the type's hash: that of the type which is published, else of the usual one.
+    /// Returns the key without the type's hash: for the type that is published, else for `JointState`.
     fn stem(&self, seen: &Seen) -> String {
         let stem = |of: JointStateType| self.scheme.stem(&self.topic, &of.dds_type());
         let mut all = JointStateType::ALL.into_iter().map(stem);
@@ -65,7 +69,7 @@ impl Expected {
     }
 }
 
-/// Why nothing that can be used comes.
+/// Returns the reason why no usable message arrives.
 pub(super) fn diagnose(expected: &Expected, fed: &Fed, seen: &Seen) -> Trouble {
     let stem = expected.stem(seen);
     let own = seen.publications.by_key.get(&stem);
@@ -85,12 +89,12 @@ pub(super) fn diagnose(expected: &Expected, fed: &Fed, seen: &Seen) -> Trouble {
     } else if fed.was_well {
         gone(expected, &stem)
     } else {
-        Trouble::new(format!("nobody publishes {stem}")).likely(misnamed(expected, seen))
+        Trouble::new(format!("no publisher of {stem}")).likely(misnamed(expected, seen))
     };
     trouble.expects(expected.lines()).sees(lines(seen, &stem))
 }
 
-/// What came before and comes no more. Only `rmw_zenoh` tells whether its publisher is still there.
+/// Describes a topic whose messages have stopped. Only `rmw_zenoh` shows whether its publisher still exists.
 fn gone(expected: &Expected, stem: &str) -> Trouble {
     if expected.scheme.keys == Keys::RmwZenoh {
         return Trouble::new(format!("the publisher of {stem} has gone")).likely(Some(
@@ -106,7 +110,7 @@ fn gone(expected: &Expected, stem: &str) -> Trouble {
 fn unconnected(expected: &Expected, fed: &Fed, seen: &Seen) -> Trouble {
     if expected.connect.is_empty() {
         return Trouble::new(format!(
-            "nobody has connected to {}",
+            "no peer has connected to {}",
             expected.listen.join(", ")
         ))
         .likely(Some(
@@ -137,7 +141,7 @@ fn unconnected(expected: &Expected, fed: &Fed, seen: &Seen) -> Trouble {
         .likely(Some(likely.to_owned()))
 }
 
-/// Messages come, but none can be used.
+/// Describes messages that arrive, but cannot be used.
 fn unusable(expected: &Expected, fed: &Fed, stem: &str, own: Option<&Publication>) -> Trouble {
     if fed.undecodable > 0 {
         let reason = fed.reason.clone().unwrap_or_default();
@@ -191,13 +195,13 @@ fn unusable(expected: &Expected, fed: &Fed, stem: &str, own: Option<&Publication
     Trouble::new(format!("the joint states on {stem} make no whole sample"))
 }
 
-/// What else is published that was probably meant.
+/// Describes another publication that was probably meant.
 fn misnamed(expected: &Expected, seen: &Seen) -> Option<String> {
     let all = &seen.publications.by_key;
     if all.is_empty() {
         return Some(format!(
-            "{} connected, but nobody publishes anything: start the driver; ROS 2 must use rmw_zenoh, or \
-             zenoh-bridge-ros2dds must run beside it",
+            "{} connected, but nothing is published: start the driver; ROS 2 must use rmw_zenoh, \
+             or zenoh-bridge-ros2dds must run next to it",
             peers(seen.connected)
         ));
     }
@@ -208,12 +212,12 @@ fn misnamed(expected: &Expected, seen: &Seen) -> Option<String> {
         (Form::Plain, Keys::Ros2dds | Keys::Tauscope) => true,
         _ => false,
     };
-    // The same topic under another name of the scheme: domain, namespace, kind of key.
+    // First choice: the topic in another domain, namespace or kind of key.
     let same = states().find(|(key, found)| names(key, found, &topic));
     if let Some((key, found)) = same {
         return Some(same_topic(expected, key, found, &topic));
     }
-    // The same name with another type.
+    // Second choice: the topic with another type.
     let other_type = all
         .iter()
         .find(|(key, found)| here(found) && names(key, found, &topic));
@@ -254,7 +258,7 @@ fn names(key: &str, found: &Publication, topic: &str) -> bool {
     }
 }
 
-/// The topic as the pipeline file would name it.
+/// Returns the topic as the pipeline file would name it.
 fn topic_of(expected: &Expected, key: &str, found: &Publication) -> String {
     match &found.form {
         Form::Rmw { topic, .. } => topic.clone(),
@@ -287,7 +291,7 @@ fn same_topic(expected: &Expected, key: &str, found: &Publication, topic: &str) 
     }
 }
 
-/// Which kind of key this is.
+/// Describes the kind of a key, with the settings for it.
 fn scheme_of(key: &str, found: &Publication) -> String {
     match &found.form {
         Form::Rmw { domain, topic } => format!(
@@ -303,7 +307,7 @@ fn scheme_of(key: &str, found: &Publication) -> String {
     }
 }
 
-/// What is seen, a line a key: first the own one, then joint states, then all others.
+/// Lists the observed keys, one per line: the expected key, then joint states, then all others.
 fn lines(seen: &Seen, stem: &str) -> Vec<String> {
     let mut all: Vec<_> = seen.publications.by_key.iter().collect();
     all.sort_by_key(|(key, found)| (key.as_str() != stem, !found.is_joint_state()));

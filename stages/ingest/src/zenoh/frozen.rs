@@ -1,13 +1,13 @@
-//! Notices a driver that repeats its last measurement under new stamps: it has lost the robot, and nothing that happens
-//! to the arm shows any more.
+//! Detects a driver that repeats its last measurement under new stamps: it has lost the robot, so contacts no longer
+//! show.
 
 use tauscope_bus::{JointArray, JointState, Trouble, flags};
 
-/// So long nothing changes in a driver that measures \[ns\].
+/// Duration without any change from which a measurement is treated as frozen \[ns\].
 /// Physical: currents and encoders flicker in their last bit many times a second.
 const FROZEN_NS: i64 = 2_000_000_000;
 
-/// The newest measurement, and since when it is the same.
+/// The newest measurement, and the time since which it is unchanged.
 #[derive(Debug, Default)]
 pub(super) struct Frozen {
     newest: Option<[JointArray; 3]>,
@@ -29,19 +29,19 @@ impl Frozen {
         self.newest_ns = now_ns;
     }
 
-    /// Whether nothing changes.
+    /// Whether the measurement is frozen.
     pub fn is_frozen(&self) -> bool {
         self.newest_ns.saturating_sub(self.since_ns) >= FROZEN_NS
     }
 
-    /// What to say, if nothing changes.
+    /// Describes the frozen measurement; returns `None` if it still changes.
     pub fn trouble(&self) -> Option<Trouble> {
         if !self.is_frozen() {
             return None;
         }
         let trouble = Trouble::new(
             "position, velocity and effort of all joints have been the same to the last bit for more than 2 s: \
-             nothing that happens to the arm would show, so they count as not measured",
+             contacts would not show, so they are treated as not measured",
         );
         Some(trouble.likely(Some(
             "the driver has lost the robot and repeats its last measurement, the drives are off, or a simulation stands still"

@@ -1,11 +1,11 @@
-//! How the joints of the messages differ from those of the URDF.
+//! Differences between the joint names of the messages and those of the URDF.
 
-/// Names that are less alike than this (Jaro-Winkler, 0 to 1) do not mean the same joint.
+/// Smallest similarity (Jaro-Winkler, 0 to 1) of two names for the same joint.
 const LEAST_SIMILARITY: f64 = 0.85;
-/// Pairs that a sentence names.
+/// Maximum number of pairs named in a sentence.
 const MAX_PAIRS: usize = 4;
 
-/// The slip, where `found` lacks joints of the `wanted`.
+/// Describes the likeliest mistake if `found` lacks joints of `wanted`.
 pub(super) fn slip(wanted: &[String], found: &[String]) -> Option<String> {
     let missing: Vec<&String> = wanted.iter().filter(|name| !found.contains(name)).collect();
     if missing.is_empty() || found.is_empty() {
@@ -46,7 +46,7 @@ pub(super) fn slip(wanted: &[String], found: &[String]) -> Option<String> {
     ))
 }
 
-/// What all names of one side have before or behind those of the other.
+/// Describes the prefix or suffix that distinguishes all names of one side from those of the other.
 fn common_affix(wanted: &[String], found: &[String]) -> Option<String> {
     let all = |of: &[String], full: &dyn Fn(&str) -> String, to: &[String]| {
         of.iter().all(|name| to.contains(&full(name)))
@@ -79,7 +79,7 @@ fn common_affix(wanted: &[String], found: &[String]) -> Option<String> {
     None
 }
 
-/// Missing joints, each with the name that it probably has in the messages.
+/// Returns missing joints, each with its probable name in the messages.
 fn pairs<'a>(
     missing: &[&'a String],
     wanted: &[String],
@@ -106,7 +106,7 @@ fn pairs<'a>(
     pairs
 }
 
-/// `a, b, c`, the first few.
+/// Joins the first few names: `a, b, c`.
 pub(super) fn list<'a>(names: impl IntoIterator<Item = &'a String>) -> String {
     const MAX_LISTED: usize = 12;
     let names: Vec<&str> = names.into_iter().map(String::as_str).collect();

@@ -1,4 +1,4 @@
-//! The keys under which others publish.
+//! Keys of the subscribed topics.
 
 use std::collections::BTreeSet;
 
@@ -6,11 +6,11 @@ use tauscope_archive::ros::JointStateType;
 
 use crate::config::{Keys, ZenohConfig};
 
-/// Hashes that are warned of, each once.
+/// Maximum number of hashes that are warned of, each once.
 /// Resolution: memory; further hashes are not warned of.
 const MAX_WARNED: usize = 16;
 
-/// How a topic's name becomes a key.
+/// Mapping of topic names to keys.
 #[derive(Debug, Clone)]
 pub(super) struct KeyScheme {
     pub keys: Keys,
@@ -28,8 +28,8 @@ impl KeyScheme {
         }
     }
 
-    /// The key expression of a topic whose messages have this DDS type. The type's hash is left open:
-    /// messages of another version of the type are better read with a warning than missed in silence.
+    /// Returns the key expression of a topic whose messages have this DDS type. It matches any hash of the
+    /// type: messages of another version are better read with a warning than missed silently.
     pub fn key(&self, topic: &str, dds_type: &str) -> String {
         let stem = self.stem(topic, dds_type);
         match self.keys {
@@ -38,7 +38,7 @@ impl KeyScheme {
         }
     }
 
-    /// The key expressions of a topic of joint states, whatever their type, with the type where the key tells it.
+    /// Returns the key expressions of a topic of joint states of any type, each with the type if the key contains it.
     pub fn joint_state_keys(&self, topic: &str) -> Vec<(String, Option<JointStateType>)> {
         let typed = |of: JointStateType| (self.key(topic, &of.dds_type()), Some(of));
         match self.keys {
@@ -47,7 +47,7 @@ impl KeyScheme {
         }
     }
 
-    /// The same without the type's hash.
+    /// Returns the key expression without the type's hash.
     pub fn stem(&self, topic: &str, dds_type: &str) -> String {
         let topic = topic.trim_matches('/');
         match self.keys {
@@ -61,7 +61,7 @@ impl KeyScheme {
 /// Warns of publishers whose message type has another hash than ours.
 #[derive(Debug)]
 pub(super) struct HashWatch {
-    /// Keys end with a hash.
+    /// Whether keys end with a hash.
     active: bool,
     warned: BTreeSet<String>,
 }
@@ -74,7 +74,7 @@ impl HashWatch {
         }
     }
 
-    /// Compares the hash at the end of `key` with `expected`; whether it warned.
+    /// Compares the hash at the end of `key` with `expected`; returns whether it warned.
     pub fn compare(&mut self, key: &str, expected: &str) -> bool {
         if !self.active {
             return false;

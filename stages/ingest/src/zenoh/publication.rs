@@ -1,4 +1,4 @@
-//! What others publish on Zenoh, read from keys and from the tokens with which ROS 2 announces its publishers.
+//! Publications of others on Zenoh, read from keys and from the tokens with which ROS 2 announces its publishers.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,18 +6,18 @@ use tauscope_archive::ros::{self, JointStateType};
 
 use super::attachment::Attachment;
 
-/// Keys that are remembered; further ones are only counted.
+/// Maximum number of keys remembered; messages of further keys are only counted.
 const MAX_KEYS: usize = 256;
-/// Messages of a key that are looked into.
+/// Number of messages of a key that are decoded.
 const LOOKED_INTO: u64 = 50;
-/// Names of joints, or publishers, of one key that are remembered.
+/// Maximum number of joint names, and of publishers, remembered per key.
 const MAX_NAMES: usize = 64;
-/// Larger messages are no joint states.
+/// Maximum size of a joint state.
 const MAX_PAYLOAD_BYTES: usize = 65_536;
-/// Stands for `/` within a part of a token: `rmw_zenoh`, `zenoh-bridge-ros2dds`.
+/// Replacements of `/` within a part of a token: by `rmw_zenoh`, by `zenoh-bridge-ros2dds`.
 const SLASHES: [char; 2] = ['%', '§'];
 
-/// How a key names a topic.
+/// Forms of a key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Form {
     /// `<domain>/<topic>/<type>/<type hash>`.
@@ -27,20 +27,20 @@ pub(super) enum Form {
         /// The topic, with its slash.
         topic: String,
     },
-    /// Any other.
+    /// Any other key.
     Plain,
 }
 
-/// What is known of one key.
+/// Observations of one key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Publication {
-    /// How the key names its topic.
+    /// Form of the key.
     pub form: Form,
-    /// `sensor_msgs/msg/JointState`, where it is known.
+    /// Type such as `sensor_msgs/msg/JointState`, if known.
     pub type_name: Option<String>,
-    /// Publishers that have announced themselves.
+    /// Number of announced publishers.
     pub announced: usize,
-    /// Messages that were heard.
+    /// Number of received messages.
     pub heard: u64,
     /// Joints that its messages name.
     pub joints: Vec<String>,
@@ -67,7 +67,7 @@ impl Publication {
             .is_some_and(|name| JointStateType::of(name).is_some())
     }
 
-    /// How many publish it, as far as that is known.
+    /// Returns the number of known publishers.
     pub fn publishers(&self) -> usize {
         self.announced.max(self.senders.len())
     }
@@ -92,17 +92,17 @@ impl Publication {
     }
 }
 
-/// All that was seen on a session.
+/// All publications observed on a session.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Publications {
-    /// By key, without the hash of the type.
+    /// Publications by key, without the hash of the type.
     pub by_key: BTreeMap<String, Publication>,
-    /// Messages and tokens of keys for which there was no room.
+    /// Number of messages and tokens of keys beyond [`MAX_KEYS`].
     pub more: u64,
 }
 
 impl Publications {
-    /// Takes note of a message.
+    /// Records a message.
     pub fn hear(&mut self, key: &str, payload: &[u8], attachment: Option<Attachment>) {
         let (name, form, type_name) = read_key(key);
         let Some(publication) = self.entry(name, form, type_name) else {
@@ -119,7 +119,7 @@ impl Publications {
         }
     }
 
-    /// Takes note of a token; those of others than publishers say nothing.
+    /// Records the token of a publisher; ignores other tokens.
     pub fn announce(&mut self, token: &str) {
         let Some((name, form, type_name)) = read_token(token) else {
             return;
@@ -148,7 +148,7 @@ impl Publications {
     }
 }
 
-/// The key without a type's hash, how it names its topic, and its type if it says so.
+/// Returns the key without the type's hash, its form, and its type if the key contains it.
 fn read_key(key: &str) -> (String, Form, Option<String>) {
     let parts: Vec<&str> = key.split('/').collect();
     if let [domain, topic @ .., dds_type, hash] = &parts[..]
@@ -171,8 +171,9 @@ fn rmw(
     (name, Form::Rmw { domain, topic }, Some(type_name))
 }
 
-/// The same of a publisher's token: `@ros2_lv/<domain>/<session>/<node>/<entity>/MP/<enclave>/<namespace>/<node
-/// name>/<topic>/<type>/<hash>/<qos>` or `@/<session>/@ros2_lv/MP/<key>/<type>/<qos>`.
+/// Parses a publisher's token like a key:
+/// `@ros2_lv/<domain>/<session>/<node>/<entity>/MP/<enclave>/<namespace>/<node name>/<topic>/<type>/<hash>/<qos>` or
+/// `@/<session>/@ros2_lv/MP/<key>/<type>/<qos>`.
 fn read_token(token: &str) -> Option<(String, Form, String)> {
     let parts: Vec<&str> = token.split('/').collect();
     match &parts[..] {

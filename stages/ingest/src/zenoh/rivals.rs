@@ -1,21 +1,21 @@
-//! Publishers that tell of the same joints on one topic: a driver that was started twice, or a bag that is played
-//! beside the robot. Their states mixed would be the motion of no arm.
+//! Publishers that send the same joints on one topic: a driver that was started twice, or a bag that is played while
+//! the robot runs. A mixture of their states would not be the motion of any arm.
 
-/// A publisher that has been silent for so long may be replaced \[ns\], or for longer where it speaks seldom.
+/// Minimum silence after which a publisher may be replaced \[ns\]; see also [`SILENT_PERIODS`].
 /// Physical: shorter than the start of a driver.
 const SILENT_NS: i64 = 500_000_000;
-/// So many of its own periods.
+/// Minimum silence after which a publisher may be replaced, in its own periods.
 /// Statistical: two messages may be lost.
 const SILENT_PERIODS: i64 = 3;
-/// Publishers that are heard at once; a robot's joints may be spread over several.
+/// Maximum number of accepted publishers; a robot's joints may be spread over several.
 /// Resolution: memory; more than arms have joints.
 const MAX_HEARD: usize = 32;
 
-/// A publisher that is heard.
+/// An accepted publisher.
 #[derive(Debug, Clone, Copy)]
 struct Heard {
     publisher: [u8; 16],
-    /// Bit j: it tells of joint j.
+    /// Joints that it sends: bit j is joint j.
     joints: u32,
     last_ns: i64,
     period_ns: i64,
@@ -24,24 +24,25 @@ struct Heard {
 impl Heard {
     fn speaks(&self, now_ns: i64) -> bool {
         let patience_ns = SILENT_NS.max(self.period_ns.saturating_mul(SILENT_PERIODS));
-        // A clock of reception that was set back does not make it speak for ever.
+        // Absolute: a clock of reception that is set back must not keep it accepted for ever.
         (now_ns - self.last_ns).saturating_abs() < patience_ns
     }
 }
 
-/// Hears one publisher for each joint: the one that spoke first, until it ceases.
+/// Accepts one publisher for each joint: the first one, until it falls silent.
 #[derive(Debug, Default)]
 pub(super) struct Rivals {
     heard: Vec<Heard>,
     refused: u64,
-    /// The publisher that was refused last, and when.
+    /// The publisher that was refused last, and the time of its message.
     newest_refused: Option<([u8; 16], i64)>,
-    /// When one that is heard last spoke beside one that is refused: a driver that was started again speaks instead.
+    /// Time of the last message of an accepted publisher while another one was being refused. A restarted driver does
+    /// not set it, since the old one is silent.
     beside_ns: Option<i64>,
 }
 
 impl Rivals {
-    /// Whether a message of `publisher` about these joints, received at `now_ns`, is to be heard.
+    /// Returns whether a message of `publisher` with these joints, received at `now_ns`, is accepted.
     pub fn admits(&mut self, publisher: [u8; 16], joints: u32, now_ns: i64) -> bool {
         let is_rival = |other: &Heard| {
             other.publisher != publisher && other.joints & joints != 0 && other.speaks(now_ns)
@@ -74,12 +75,12 @@ impl Rivals {
         true
     }
 
-    /// Messages that were not heard.
+    /// Returns the number of refused messages.
     pub fn refused(&self) -> u64 {
         self.refused
     }
 
-    /// Whether two spoke of the same joints lately.
+    /// Whether two publishers have sent the same joints recently.
     pub fn are_there(&self, now_ns: i64) -> bool {
         self.beside_ns.is_some_and(|at_ns| is_recent(at_ns, now_ns))
     }
@@ -105,7 +106,7 @@ mod tests {
         }
         assert_eq!(rivals.refused(), 1000);
         assert!(rivals.are_there(1000 * MS));
-        // The robot's driver has ended: who goes on is heard.
+        // The robot's driver has ended: the other publisher is accepted after the silence.
         assert!(!rivals.admits(bag, 0b10, 1400 * MS));
         assert!(rivals.admits(bag, 0b10, 1600 * MS));
         assert!(!rivals.admits(robot, 0b11, 1700 * MS));

@@ -1,7 +1,8 @@
-//! Looks on a session for what else is there, while what is waited for does not come.
+//! Observes the other traffic of a session while the expected messages do not arrive.
 //!
-//! For a short time it hears everything, which may be much (cameras), asks for the tokens with which ROS 2 announces
-//! its publishers, and tries the endpoints that cannot be reached. Then it is quiet for longer than it looked.
+//! For a short time it subscribes to everything, which may be much (cameras), queries the tokens with which ROS 2
+//! announces its publishers, and tries the endpoints that cannot be reached. Then it pauses for longer than it
+//! looked.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,42 +15,42 @@ use super::attachment::Attachment;
 use super::publication::Publications;
 use crate::tcp;
 
-/// How long it hears everything.
+/// Duration of a look.
 const LOOK_FOR: Duration = Duration::from_millis(1500);
-/// From one look to the next.
+/// Interval between the starts of two looks.
 const LOOK_EVERY: Duration = Duration::from_secs(10);
-/// How long an endpoint may take to answer.
+/// Timeout for the answer of an endpoint.
 const ANSWER_WITHIN: Duration = Duration::from_millis(1500);
-/// Everything but what Zenoh and ROS 2 say of themselves.
+/// Key expression of all keys except the administrative ones of Zenoh and ROS 2.
 const EVERYTHING: &str = "**";
 /// Tokens of `rmw_zenoh` and of `zenoh-bridge-ros2dds`.
 const TOKENS: [&str; 2] = ["@ros2_lv/**", "@/*/@ros2_lv/**"];
 
-/// What was seen in one look.
+/// Result of a look.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Seen {
-    /// What is published.
+    /// Publications on the session.
     pub publications: Publications,
-    /// Endpoints that were tried, and why they did not answer; nothing for those that did.
+    /// Endpoints that were tried, each with the reason of its failure; `None` for those that answered.
     pub endpoints: Vec<(String, Option<String>)>,
-    /// Routers and peers that the session is connected to.
+    /// Number of routers and peers that the session is connected to.
     pub connected: usize,
 }
 
-/// Looks around.
+/// Observer of a session.
 #[derive(Debug)]
 pub(super) struct Scout {
     endpoints: Vec<String>,
     found: Arc<Mutex<Seen>>,
-    /// A thread tries the endpoints; there is never more than one.
+    /// Whether a thread is trying the endpoints; there is never more than one.
     trying: Arc<AtomicBool>,
     look: Option<Look>,
     began: Option<Instant>,
-    /// What the last whole look gave.
+    /// Result of the last complete look.
     newest: Option<Seen>,
 }
 
-/// Hears everything until it is dropped.
+/// A look in progress; it subscribes to everything until it is dropped.
 #[derive(Debug)]
 struct Look {
     began: Instant,
@@ -57,7 +58,7 @@ struct Look {
 }
 
 impl Scout {
-    /// For a session that connects to these endpoints.
+    /// Creates a scout for a session that connects to these endpoints.
     pub fn new(endpoints: &[String]) -> Self {
         Self {
             endpoints: endpoints.to_vec(),
@@ -69,7 +70,7 @@ impl Scout {
         }
     }
 
-    /// Begins a look where it is time for one, ends one that took its time; what was seen last.
+    /// Starts a look if one is due, and ends a look whose time is over; returns the newest result.
     pub fn look(&mut self, session: &Session) -> Option<&Seen> {
         let now = Instant::now();
         if let Some(look) = &self.look
@@ -80,7 +81,7 @@ impl Scout {
             seen.connected = connected(session);
             self.newest = Some(seen);
         }
-        // Once a router answers, other things are seen than before.
+        // A new or lost connection changes the observable traffic.
         let had_connection = self.newest.as_ref().map(|seen| seen.connected > 0);
         let changed = had_connection.is_some_and(|had| had != (connected(session) > 0));
         let is_due = |began: Instant| changed || now.duration_since(began) >= LOOK_EVERY;
@@ -91,7 +92,7 @@ impl Scout {
         self.newest.as_ref()
     }
 
-    /// All is well: nothing is looked for, and what was seen is forgotten.
+    /// Stops looking and discards the results, while the source has samples.
     pub fn rest(&mut self) {
         self.look = None;
         self.began = None;
@@ -116,7 +117,7 @@ impl Scout {
                             .announce(token.key_expr().as_str());
                     }
                 });
-            // A session that cannot ask has no connection, which is said.
+            // It fails only without a connection, which the result reports.
             let _ = asked.wait();
         }
         let found = Arc::clone(&self.found);
@@ -134,7 +135,7 @@ impl Scout {
         }
     }
 
-    /// Tries the endpoints in a thread of its own: names may take long to be looked up.
+    /// Tries the endpoints in a thread of its own, since resolving names may take long.
     fn try_endpoints(&self) {
         if self.trying.swap(true, Ordering::Relaxed) {
             return;
@@ -151,13 +152,13 @@ impl Scout {
     }
 }
 
-/// How many routers and peers a session is connected to.
+/// Returns the number of routers and peers that a session is connected to.
 pub(super) fn connected(session: &Session) -> usize {
     let info = session.info();
     info.peers_zid().wait().count() + info.routers_zid().wait().count()
 }
 
-/// Why `tcp/10.0.0.1:7447` cannot be reached, if it cannot.
+/// Returns the reason why an endpoint such as `tcp/10.0.0.1:7447` cannot be reached, if it cannot.
 fn fault_of(endpoint: &str) -> Option<String> {
     let (_, address) = endpoint.split_once('/')?;
     let address = address.split(['?', '#']).next().unwrap_or(address);
@@ -165,7 +166,7 @@ fn fault_of(endpoint: &str) -> Option<String> {
     reached.err().map(|fault| fault.to_string())
 }
 
-/// Nothing in here can be left half done, so a panic elsewhere does not matter.
+/// Locks the result, even if poisoned: no operation on it can be left half done.
 fn lock(found: &Mutex<Seen>) -> MutexGuard<'_, Seen> {
     found.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,4 +1,4 @@
-//! Messages as they come from Zenoh.
+//! Messages received from Zenoh.
 
 use tauscope_archive::ros::JointStateType;
 use zenoh::bytes::ZBytes;
@@ -6,7 +6,7 @@ use zenoh::key_expr::KeyExpr;
 
 use super::attachment::Attachment;
 
-/// Which part of a sample a message brings.
+/// Part of a sample that a message supplies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Role {
     State,
@@ -16,11 +16,11 @@ pub(super) enum Role {
     Learn,
 }
 
-/// A message as it came.
+/// A received message that is not decoded yet.
 #[derive(Debug)]
 pub(super) struct Waiting {
     pub role: Role,
-    /// The type of its joint state, where the key tells it.
+    /// Type of its joint state, if the key contains it.
     pub joint_state_type: Option<JointStateType>,
     pub received_ns: i64,
     pub key: KeyExpr<'static>,

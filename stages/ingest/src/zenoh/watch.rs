@@ -1,4 +1,4 @@
-//! Notices that a live source gives nothing that can be used, and finds out why.
+//! Detects that a live source gives no usable samples, and diagnoses the reason.
 
 use std::time::{Duration, Instant};
 
@@ -11,27 +11,27 @@ use super::frozen::Frozen;
 use super::scout::Scout;
 use crate::pack::Packer;
 
-/// A source that gave nothing for so long is looked after; what is wrong is known a look later.
+/// Silence after which a source is diagnosed; the diagnosis is available one look later.
 const SILENT_AFTER: Duration = Duration::from_secs(1);
-/// Samples without efforts are waited through for so long: a driver may begin with them.
+/// Grace period for samples without efforts, since a driver may begin with them.
 const EFFORTS_WITHIN: Duration = Duration::from_secs(3);
 
-/// Watches over one source.
+/// Watch over one source.
 #[derive(Debug)]
 pub(super) struct Watch {
     expected: Expected,
     scout: Scout,
     fed: Fed,
-    /// What packing had counted at the newest sample.
+    /// Counts of packed and refused messages at the newest sample.
     packed: Counts,
     first_sample: Option<Instant>,
-    /// When a sample last had efforts.
+    /// Time of the last sample with efforts.
     effort_at: Option<Instant>,
     frozen: Frozen,
 }
 
 impl Watch {
-    /// Over a source that waits for this.
+    /// Creates a watch over a source that expects this.
     pub fn new(expected: Expected) -> Self {
         Self {
             scout: Scout::new(&expected.connect),
@@ -44,7 +44,7 @@ impl Watch {
         }
     }
 
-    /// A joint state came; `fault` is why it could not be read.
+    /// Records a joint state; `fault` is the reason if it could not be decoded.
     pub fn state(&mut self, fault: Option<&str>) {
         self.fed.messages += 1;
         if let Some(fault) = fault {
@@ -58,7 +58,7 @@ impl Watch {
         self.frozen.is_frozen()
     }
 
-    /// A sample goes out.
+    /// Records an emitted sample.
     pub fn sample(&mut self, sample: &JointState, packed: Counts) {
         let now = Instant::now();
         if sample.header.has(flags::EFFORT_MEASURED) {
@@ -75,7 +75,7 @@ impl Watch {
         }
     }
 
-    /// What is wrong, `silent_for` after the last sample.
+    /// Returns the trouble of the source, `silent_for` after its last sample.
     pub fn trouble(
         &mut self,
         silent_for: Duration,
@@ -100,14 +100,14 @@ impl Watch {
         Some(diagnose(&self.expected, &fed, seen))
     }
 
-    /// What to say of a second publisher.
+    /// Describes the trouble of a second publisher.
     pub fn rivals(&self) -> Trouble {
         let topic = &self.expected.topic;
         let trouble = Trouble::new(format!(
-            "two publishers send the same joints on {topic}: only the one that spoke first is heard"
+            "two publishers send the same joints on {topic}: only the first one is accepted"
         ));
         trouble.likely(Some(
-            "the driver was started twice, or a recording is played beside the robot".to_owned(),
+            "the driver was started twice, or a recording plays while the robot runs".to_owned(),
         ))
     }
 
@@ -134,7 +134,7 @@ impl Watch {
     }
 }
 
-/// States whose stamps do not advance.
+/// Returns the number of states whose stamps do not advance.
 fn stale(counts: Counts) -> u64 {
     counts.late + counts.repeated + counts.stalled
 }

@@ -1,4 +1,4 @@
-//! What the tests of the sources share.
+//! Shared helpers for the tests of the sources.
 #![allow(
     dead_code,
     clippy::unwrap_used,
@@ -13,7 +13,7 @@ use tauscope_archive::{Compression, McapWriter, ros};
 use tauscope_bus::{Emit, LinkError, Progress, Sample, Source};
 use tauscope_ingest::{FileConfig, Setup, Topics};
 
-/// Keeps what is emitted.
+/// Buffer of emitted samples.
 pub struct Collect<T>(pub Vec<T>);
 
 impl<T: Sample> Emit<T> for Collect<T> {
@@ -25,7 +25,7 @@ impl<T: Sample> Emit<T> for Collect<T> {
     }
 }
 
-/// All samples of a source that ends.
+/// Returns all samples of a source that ends.
 pub fn drain<T: Sample>(source: &mut impl Source<T>) -> Vec<T> {
     let mut out = Collect(Vec::new());
     while source.step(&mut out).unwrap() != Progress::End {}
@@ -83,7 +83,7 @@ pub fn shared(test: &str, path: &str) -> Option<PathBuf> {
     if shared.is_dir() {
         return Some(shared.join(path));
     }
-    // Past the test harness, which would swallow it.
+    // Not `eprintln!`, whose output the test harness captures.
     let _ = writeln!(std::io::stderr(), "SKIPPED {test}: ../shared is absent");
     None
 }

@@ -1,4 +1,4 @@
-//! What the alarm does, as statements over a short story told in tenths of a second.
+//! Behaviour of the alarm in short sequences of samples, a tenth of a second apart.
 
 use tauscope_bus::command::Request;
 use tauscope_bus::{Detection, flags};
@@ -20,7 +20,7 @@ impl Story {
         }
     }
 
-    /// The next sample, of which the detector says `state`.
+    /// Feeds the next sample, for which the detector reports `state`.
     fn says(&mut self, state: &str) -> (State, bool) {
         self.tenths += 1;
         let detection = said(self.tenths, state);
@@ -28,7 +28,7 @@ impl Story {
         (self.alarm.state(), self.alarm.is_free())
     }
 
-    /// A command that holds from the next sample on.
+    /// Feeds a command that takes effect at the next sample.
     fn told(&mut self, request: &Request) -> &mut Self {
         let stamp_ns = (self.tenths + 1) * TENTH_NS;
         self.alarm.command(stamp_ns, request.command().unwrap());

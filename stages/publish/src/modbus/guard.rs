@@ -1,9 +1,11 @@
-//! What a client sends, looked at before tokio-modbus decodes it.
+//! Checks of a client's requests before tokio-modbus decodes them.
 //!
-//! That (0.17) indexes past the end of a request to write several coils (function 15) which says that it has more of
-//! them than bytes: the panic ends the client's task. Such a request ends the client here, in order.
+//! A request to write several coils (function 15) may announce more coils than it has bytes for. tokio-modbus 0.17
+//! then indexes past its end, and the panic ends the client's task. The guard closes the connection with an error
+//! instead.
 //!
-//! A client whose cable was pulled is never heard to leave. One that says nothing for long ends here, too.
+//! A client whose cable was unplugged does not disconnect. The guard also disconnects a client that is silent for
+//! long.
 
 use std::future::Future as _;
 use std::io;
@@ -17,25 +19,26 @@ use tokio::time::{Instant, Sleep};
 
 /// Bytes before a request: transaction, protocol and length (MODBUS Messaging on TCP/IP 1.0b, section 3.1.3).
 const BEFORE: usize = 6;
-/// Unit, function, address, number of coils, number of bytes: where the coils begin.
+/// Bytes before the coils: unit, function, address, number of coils and number of bytes follow [`BEFORE`].
 const HEAD: usize = BEFORE + 7;
 const WRITE_SEVERAL_COILS: u8 = 15;
 
-/// A client's stream.
+/// Guarded stream of a client.
 pub(super) struct Guard<S> {
     stream: S,
     requests: Requests,
     from: SocketAddr,
-    /// For so long it may say nothing, and until when.
+    /// Timeout of a silent client.
     idle: Duration,
+    /// Expiry of the timeout.
     end: Pin<Box<Sleep>>,
 }
 
-/// How far the requests have come.
+/// Parsing state of the requests.
 #[derive(Default)]
 struct Requests {
     head: [u8; HEAD],
-    /// Bytes of the present one so far.
+    /// Number of bytes of the current request so far.
     at: usize,
 }
 
@@ -66,7 +69,7 @@ impl Requests {
 }
 
 impl<S> Guard<S> {
-    /// Of the client `from`, which may say nothing for as long as `idle`.
+    /// Guards the stream of the client `from`, with the timeout `idle`.
     pub(super) fn new(stream: S, from: SocketAddr, idle: Duration) -> Self {
         Self {
             stream,
@@ -77,15 +80,15 @@ impl<S> Guard<S> {
         }
     }
 
-    /// It has said something, or taken an answer.
+    /// Restarts the timeout, after the client has sent bytes or received an answer.
     fn moves(&mut self) {
-        // A time beyond what there is, is none.
+        // An expiry beyond the range of the clock means no timeout.
         if let Some(end) = Instant::now().checked_add(self.idle) {
             self.end.as_mut().reset(end);
         }
     }
 
-    /// Ready once it has been silent for too long.
+    /// Is ready once the client has been silent for too long.
     fn poll_silence(&mut self, context: &mut Context<'_>) -> Poll<io::Error> {
         ready!(self.end.as_mut().poll(context));
         let (from, idle_s) = (self.from, self.idle.as_secs_f64());
@@ -138,9 +141,9 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Guard<S> {
 mod tests {
     use super::*;
 
-    /// Asks for one coil.
+    /// A request to read one coil.
     const SOUND: [u8; 12] = [0, 7, 0, 0, 0, 6, 1, 1, 0, 0, 0, 1];
-    /// Writes `coils` coils out of one byte.
+    /// Returns a request to write `coils` coils from one byte.
     const fn writes(coils: u8) -> [u8; 14] {
         [0, 7, 0, 0, 0, 8, 1, 15, 0, 0, 0, coils, 1, 0xff]
     }

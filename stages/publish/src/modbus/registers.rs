@@ -1,4 +1,4 @@
-//! The register map, pure. It is described in `docs/publish.md`, which a test compares.
+//! The register map. Pure. A test compares it with its description in `docs/publish.md`.
 
 use std::time::Instant;
 
@@ -10,18 +10,18 @@ use crate::status::Status;
 
 /// Version of the map, in the last register.
 const VERSION: u16 = 2;
-/// The coil that acknowledges when 1 is written.
+/// Coil that acknowledges when 1 is written.
 pub const ACKNOWLEDGE: u16 = 16;
-/// The coil that lets detectors learn anew when 1 is written.
+/// Coil that makes the detectors relearn when 1 is written.
 pub const LEARN: u16 = 17;
-/// The holding register that mutes for so many seconds.
+/// Holding register that mutes for the written number of seconds.
 pub const MUTE_SECONDS: u16 = 0;
-/// The first of the holding registers that are written only.
+/// First of the write-only holding registers.
 pub const PAYLOAD: u16 = 16;
-/// The holding register that notes a number in the archive.
+/// Holding register that records a number in the archive.
 pub const LABEL: u16 = 20;
-/// Names of the registers that are written only and read as 0, from [`PAYLOAD`] on: a payload is written alone or with
-/// its centre of mass.
+/// Names of the write-only registers, which read as 0, from [`PAYLOAD`] on. A payload is written alone or with its
+/// centre of mass.
 pub const WRITTEN: [&str; 5] = [
     "payload_mass",
     "payload_x",
@@ -51,47 +51,47 @@ pub const WORDS: [&str; 10] = [
     "age_ms",
     "version",
 ];
-/// Forces are told in tenths of a newton.
+/// Register counts per newton: forces are in tenths of a newton.
 const PER_N: f64 = 10.0;
-/// Masses are told in hundredths of a kilogram.
+/// Register counts per kilogram: masses are in hundredths of a kilogram.
 const PER_KG: f64 = 100.0;
-/// Places are told in millimetres.
+/// Register counts per metre: positions are in millimetres.
 const PER_M: f64 = 1000.0;
 
-/// All that can be read, at one instant.
+/// All readable values at one instant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Registers {
     bits: [bool; BITS.len()],
     words: [u16; WORDS.len()],
 }
 
-/// What a write asks for.
+/// Command requested by a write.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Write {
-    /// The acknowledge coil was set to 0: nothing.
+    /// No command: a coil was set to 0.
     Nothing,
-    /// To acknowledge.
+    /// Acknowledgement.
     Acknowledge,
-    /// To mute.
+    /// Mute.
     Mute {
-        /// For so long \[s\].
+        /// Duration \[s\].
         seconds: f64,
     },
-    /// Another payload.
+    /// Change of the payload.
     Payload {
         /// Mass \[kg\].
         mass_kg: f64,
         /// Centre of mass in the tool link's frame \[m\].
         com_m: [f64; 3],
     },
-    /// To learn anew.
+    /// Relearning.
     Learn,
     /// A number for the archive.
     Label(u16),
 }
 
 impl Registers {
-    /// What `status` reads as at the instant `now`.
+    /// Returns the values of `status` at the instant `now`.
     pub fn of(status: &Status, now: Instant) -> Self {
         let alarm = status.at(now);
         let state = alarm.state;
@@ -127,7 +127,7 @@ impl Registers {
         }
     }
 
-    /// `count` bits from address `at`. What is written only reads as 0.
+    /// Returns `count` bits from address `at`. Write-only coils read as 0.
     ///
     /// # Errors
     /// If one of them does not exist.
@@ -138,7 +138,7 @@ impl Registers {
         })
     }
 
-    /// `count` registers from address `at`.
+    /// Returns `count` registers from address `at`. Write-only registers read as 0.
     ///
     /// # Errors
     /// If one of them does not exist.
@@ -157,7 +157,7 @@ fn part<T: Copy>(all: &[T], at: u16, count: u16) -> Result<Vec<T>, ExceptionCode
         .ok_or(ExceptionCode::IllegalDataAddress)
 }
 
-/// What it means to write `value` to the coil `at`.
+/// Returns the command of writing `value` to the coil `at`.
 ///
 /// # Errors
 /// If it cannot be written.
@@ -170,10 +170,10 @@ pub fn coil(at: u16, value: bool) -> Result<Write, ExceptionCode> {
     }
 }
 
-/// What it means to write `values` to the holding registers from `at` on.
+/// Returns the command of writing `values` to the holding registers from `at` on.
 ///
 /// # Errors
-/// If they cannot be written, or not these values.
+/// If they cannot be written, or if a value is not allowed.
 pub fn words(at: u16, values: &[u16]) -> Result<Write, ExceptionCode> {
     match (at, values) {
         (MUTE_SECONDS, &[value]) if f64::from(value) <= LONGEST_MUTE_S => Ok(Write::Mute {

@@ -6,13 +6,13 @@ use tauscope_bus::{TwinState, flags};
 
 use crate::message::{JointResidual, ResidualMessage};
 
-/// What is summed in one piece \[ns\]. Resolution: a sixtieth of the window.
+/// Duration of a segment of the sums \[ns\]. Resolution: a sixtieth of the window.
 const PIECE_NS: i64 = 1_000_000_000;
-/// How many pieces are kept. Resolution: a minute covers a few cycles of most programs.
+/// Number of segments kept. Resolution: a minute covers a few cycles of most programs.
 const PIECES: usize = 60;
 
-/// What is left out before the sample at which a contact is detected, and behind its last one \[ns\]. Resolution: a
-/// detector takes less to see a contact, and the residual's filters settle within it.
+/// Excluded margin before the detection of a contact, and after its last sample \[ns\]. Resolution: a detector takes
+/// less to see a contact, and the residual's filters settle within it.
 const AROUND_CONTACT_NS: i64 = 1_000_000_000;
 
 #[derive(Debug, Clone)]
@@ -24,7 +24,7 @@ struct Piece {
     squares: Vec<f64>,
 }
 
-/// Sums of the residual over the last minute. Memory is fixed.
+/// Sums of the residual over the last minute, in fixed memory.
 #[derive(Debug)]
 pub struct Residual {
     joints: Vec<String>,
@@ -35,7 +35,7 @@ pub struct Residual {
 }
 
 impl Residual {
-    /// Of these joints; `calibrated` by joint, as far as the twin's file says it \[effort unit\].
+    /// Creates the sums of these joints; `calibrated` is by joint, as far as the twin's file has it \[effort unit\].
     pub fn new(joints: Vec<String>, calibrated: Vec<Option<f64>>) -> Self {
         Self {
             joints,
@@ -45,7 +45,8 @@ impl Residual {
         }
     }
 
-    /// Something touches the robot at this sample: what is just before and behind it says nothing of the arm.
+    /// Records a contact at this sample, and discards the residual just before it, which the contact may have
+    /// changed.
     pub fn touched(&mut self, stamp_ns: i64) {
         self.touched_ns = Some(stamp_ns);
         let near_ns = stamp_ns.saturating_sub(AROUND_CONTACT_NS);
@@ -58,7 +59,7 @@ impl Residual {
         }
     }
 
-    /// Takes what the twin made of a sample.
+    /// Takes a sample of the twin.
     pub fn twin(&mut self, sample: &TwinState) {
         let stamp_ns = sample.header.stamp_ns;
         let residual = &sample.residual[..self.joints.len()];
@@ -71,7 +72,7 @@ impl Residual {
         if since_ns.is_some_and(|since_ns| (0..AROUND_CONTACT_NS).contains(&since_ns)) {
             return;
         }
-        // A clock that was set back begins anew.
+        // The sums restart after a clock that was set back.
         if self
             .pieces
             .back()
@@ -103,7 +104,7 @@ impl Residual {
         }
     }
 
-    /// What is known by now; `None` before the first sample.
+    /// Returns the residual so far; `None` before the first sample.
     pub fn message(&self) -> Option<ResidualMessage> {
         let stamp_ns = self.pieces.back()?.end_ns;
         let spans = self

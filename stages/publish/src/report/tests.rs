@@ -81,7 +81,7 @@ fn a_contact_is_told_when_it_begins_is_latched_ends_and_is_acknowledged_and_by_w
         (news[0].acknowledged_ns, &news[0].acknowledged_by),
         (Some(4 * S), &by)
     );
-    // It is over: another acknowledgement is nobody's.
+    // The contact is acknowledged already: another acknowledgement has no effect.
     report.command(5 * S, &Request::Acknowledge.command().unwrap());
     assert!(told(&mut report).is_empty());
     assert_eq!(report.last().unwrap().acknowledged_by, by);
@@ -182,7 +182,7 @@ fn the_residual_is_that_of_the_last_minute() {
         let mut sample = TwinState::default();
         sample.header.stamp_ns = i * S / 10;
         sample.header.flags = flags::READY;
-        // Two minutes; in the second it swings about 1.
+        // Two minutes; in the second one the residual oscillates about 1.
         sample.residual[0] = if i < 600 {
             50.0
         } else {
@@ -207,7 +207,7 @@ fn what_is_around_a_contact_says_nothing_of_the_arm() {
         let mut sample = TwinState::default();
         sample.header.stamp_ns = i * S / 10;
         sample.header.flags = flags::READY;
-        // A push from 10 s to 12 s, seen from 10.5 s to 12 s; the arm swings until 12.5 s.
+        // A push from 10 s to 12 s, detected from 10.5 s to 12 s; the arm oscillates until 12.5 s.
         sample.residual[0] = if (100..125).contains(&i) { 9.0 } else { 1.0 };
         residual.twin(&sample);
         if (105..=120).contains(&i) {

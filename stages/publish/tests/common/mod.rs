@@ -1,4 +1,4 @@
-//! A publisher, the samples that it is fed with, and a place to meet.
+//! Shared helpers: a publisher, samples for it, and endpoints.
 #![allow(dead_code, reason = "each test file uses its own part")]
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
@@ -13,7 +13,7 @@ use tauscope_bus::{
 use tauscope_dynamics::Model;
 use tauscope_publish::{Config, Facts, Publisher, Setup, StreamInfo};
 
-/// Slow machines run the tests, too; nothing waits this long where all is well.
+/// Timeout of a test; generous, since slow machines run the tests too.
 pub const PATIENCE: Duration = Duration::from_secs(30);
 pub const CELL: &str = "press-1";
 
@@ -23,13 +23,13 @@ const ARM: &str = r#"<robot name="arm"><link name="base"/>
   <joint name="hinge" type="revolute"><origin xyz="0 0 1"/><parent link="base"/><child link="upper"/>
     <axis xyz="0 0 1"/><limit lower="-3" upper="3" velocity="2" effort="50"/></joint></robot>"#;
 
-/// An endpoint that nobody listens on right now.
+/// Returns an endpoint without a listener.
 pub fn endpoint() -> String {
     let free = TcpListener::bind("127.0.0.1:0").unwrap();
     format!("tcp/127.0.0.1:{}", free.local_addr().unwrap().port())
 }
 
-/// A session that connects there.
+/// Opens a session that connects to an endpoint.
 pub fn session(endpoint: &str) -> zenoh::Session {
     let endpoints = ZenohEndpoints {
         listen: Vec::new(),
@@ -38,12 +38,12 @@ pub fn session(endpoint: &str) -> zenoh::Session {
     endpoints.session().unwrap()
 }
 
-/// A publisher of one detector, `twin_regression` of the stage `detect`.
+/// Creates a publisher of one detector, `twin_regression` of the stage `detect`.
 pub fn publisher(yaml: &str, commands: Option<&str>) -> Publisher {
     made(yaml, commands, false)
 }
 
-/// The same without commands, after one that died.
+/// Creates a publisher like [`publisher`] without commands, restarted after a crash.
 pub fn restarted(yaml: &str) -> Publisher {
     made(yaml, None, true)
 }
@@ -85,7 +85,7 @@ fn header(ms: i64, flags: u32) -> Header {
     }
 }
 
-/// The twin's part of a sample.
+/// Returns the twin's part of a sample.
 pub fn twin(ms: i64) -> TwinState {
     let mut twin = TwinState {
         header: header(ms, flags::READY),
@@ -96,7 +96,7 @@ pub fn twin(ms: i64) -> TwinState {
     twin
 }
 
-/// What the detector says of a sample: `free`, `contact`, `collision`. A contact is a push of 5 N at the upper link.
+/// Returns a detection in the state `free`, `contact` or `collision`. A contact is a push of 5 N at the upper link.
 pub fn says(ms: i64, state: &str) -> Detection {
     let touched = state != "free";
     let alarm = flags::ALARM | flags::FORCE;
@@ -121,7 +121,7 @@ pub fn feed(publisher: &mut Publisher, detection: &Detection) {
         .unwrap();
 }
 
-/// Waits until `met`, doing `step` again and again.
+/// Repeats `step` until it returns true.
 pub fn until(what: &str, mut step: impl FnMut() -> bool) {
     let deadline = Instant::now() + PATIENCE;
     while !step() {
@@ -130,7 +130,7 @@ pub fn until(what: &str, mut step: impl FnMut() -> bool) {
     }
 }
 
-/// Joint states, one after the other, without end.
+/// An endless source of joint states.
 #[derive(Default)]
 pub struct States(i64);
 
@@ -143,7 +143,7 @@ impl Source<JointState> for States {
     }
 }
 
-/// Keeps what is emitted.
+/// Buffer of emitted samples.
 #[derive(Default)]
 pub struct Collect(pub Vec<JointState>);
 
@@ -156,7 +156,7 @@ impl Emit<JointState> for Collect {
     }
 }
 
-/// Answers every command that comes in at `endpoint` with this answer, and tells what was asked, as long as it lives.
+/// A source that gives each command the same answer and forwards its request, until it is dropped.
 pub struct Answering {
     _session: zenoh::Session,
     pub asked: std::sync::mpsc::Receiver<Request>,

@@ -1,6 +1,6 @@
-//! What a joint state carries besides the measurement, so that the archive replays as the recording did: the commanded
-//! motion, the tool, requests for learning, and what somebody told the pipeline. Written when they change; a commanded
-//! motion that stays is told again now and then, because a source takes none that is old.
+//! Topics for the other content of a joint state: commanded motion, tool, requests to learn, and commands to the
+//! pipeline. With them a replay of the archive equals the recorded run. They are written on change. A constant
+//! commanded motion is repeated, because a source ignores an old one.
 
 use tauscope_archive::ros::{self, DiagnosticArray, Inertia, InertiaStamped, Level};
 use tauscope_archive::{TopicWriter, WriteError};
@@ -10,7 +10,7 @@ use super::File;
 use super::joints::{JointTopic, status};
 use crate::streams::{Stream, Streams};
 
-/// The topics of the command, the tool and the requests, made when there is something to write.
+/// Topics of commands, tool and requests, created with their first message.
 pub(super) struct CommandTopics {
     joints: Vec<String>,
     command_name: String,
@@ -27,11 +27,11 @@ pub(super) struct CommandTopics {
     cell: String,
 }
 
-/// A command is told again after this time \[ns\].
+/// Repetition period of an unchanged command \[ns\].
 /// Resolution: size of the archive, against how soon a late reader sees the command.
 const REPEAT_NS: u64 = 100_000_000;
 
-/// Position, and velocity if it was given.
+/// Commanded position, and velocity if given.
 type Command = (JointArray, Option<JointArray>);
 
 /// Mass, centre of mass and inertia.
@@ -58,8 +58,7 @@ impl CommandTopics {
         }
     }
 
-    /// What must be read before the state itself: a request for learning, or a command, holds from the state behind it
-    /// on.
+    /// Writes what must precede the state: a request to learn or a command applies from the following state on.
     pub fn write_ahead(&mut self, file: &mut File, sample: &JointState) -> Result<(), WriteError> {
         if let Some(verb) = sample.command.verb() {
             let arguments = sample.command.arguments();
@@ -86,7 +85,7 @@ impl CommandTopics {
         Ok(())
     }
 
-    /// What may be read behind the state.
+    /// Writes what may follow the state.
     pub fn write(&mut self, file: &mut File, sample: &JointState) -> Result<(), WriteError> {
         let header = &sample.header;
         if header.has(flags::COMMAND) {

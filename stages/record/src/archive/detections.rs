@@ -18,7 +18,7 @@ pub(super) struct DetectionTopics {
     wrench: Option<TopicWriter<WrenchStamped>>,
     wrench_name: String,
     frame: String,
-    /// State and alarm that were written last.
+    /// State and alarm of the last message.
     previous: Option<(Name, bool)>,
     threshold_before: Option<f64>,
 }
@@ -109,7 +109,7 @@ impl DetectionTopics {
     }
 }
 
-/// Says what began, ended or changed.
+/// Formatter of status messages about events and states.
 struct Teller<'a> {
     detection: &'a Detection,
     label: &'a str,
@@ -121,7 +121,7 @@ struct Teller<'a> {
 type Values = Vec<(&'static str, String)>;
 
 impl Teller<'_> {
-    /// What holds from now on; of a contact that begins, the first guess.
+    /// Status from now on; for the onset of a contact, its first estimate.
     fn now(&self, open: Option<&Contact>) -> ros::DiagnosticStatus {
         let level = match Severity::of(self.detection) {
             Severity::Ok => Level::Ok,
@@ -137,7 +137,7 @@ impl Teller<'_> {
         let mut values = self.values(kind);
         let mut message = headline(self.detection);
         if let Some(open) = open.filter(|_| self.detection.alarm()) {
-            // A watch reports a change of the arm once it is sure.
+            // A watch reports a change of the arm only when its estimate is final.
             if open.size.is_none() {
                 message += " (first guess)";
                 values.push(("estimate", "provisional".to_owned()));
@@ -147,7 +147,7 @@ impl Teller<'_> {
         status(level, self.label, message, self.cell, values)
     }
 
-    /// What a contact was, now that it is over.
+    /// Status at the end of a contact, with its final estimate.
     fn end(&self, ended: &Contact) -> ros::DiagnosticStatus {
         let mut values = self.values("offset");
         values.push(("estimate", "final".to_owned()));
@@ -199,7 +199,7 @@ impl Teller<'_> {
     }
 }
 
-/// Where a force points and acts, a number a key.
+/// Direction and point of application of a force, one number per key.
 fn places(force: &Force) -> impl Iterator<Item = (&'static str, String)> {
     let directions = ["direction_x", "direction_y", "direction_z"];
     let points = ["point_x_m", "point_y_m", "point_z_m"];
@@ -208,7 +208,7 @@ fn places(force: &Force) -> impl Iterator<Item = (&'static str, String)> {
     values.map(|(key, value)| (key, value.to_string()))
 }
 
-/// Seconds since the epoch, with all nanoseconds.
+/// Seconds since the epoch, with nanosecond digits.
 fn seconds(ns: i64) -> String {
     let time = ros::Time::from_ns(ns);
     format!("{}.{:09}", time.sec, time.nanosec)

@@ -6,7 +6,7 @@ use tauscope_bus::{Header, JointArray};
 
 use super::File;
 
-/// A topic of joint states, with a message whose memory is used again.
+/// A topic of joint states, with a reused message buffer.
 pub(super) struct JointTopic {
     topic: TopicWriter<ros::JointState>,
     message: ros::JointState,
@@ -21,7 +21,7 @@ impl JointTopic {
         Self { topic, message }
     }
 
-    /// Writes what is there; the rest stays empty.
+    /// Writes the given fields; the others stay empty.
     pub fn write(
         &mut self,
         file: &mut File,
@@ -44,7 +44,7 @@ impl JointTopic {
     }
 }
 
-/// A status with its details.
+/// Builds a status with its details.
 pub(super) fn status(
     level: Level,
     name: &str,

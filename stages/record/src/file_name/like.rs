@@ -1,11 +1,11 @@
-//! Files whose names are like a pattern's.
+//! Search for files whose names match a template.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use super::Part;
 
-/// Adds the files below `folder` that are like `components`.
+/// Adds the files below `folder` that match `components`.
 pub(super) fn find(
     folder: PathBuf,
     components: &[Vec<Part>],
@@ -18,7 +18,7 @@ pub(super) fn find(
     };
     let is_file = below.is_empty();
     if !is_file && component.is_empty() {
-        // What a path from the root begins with, or a slash too many.
+        // An empty component is the root of an absolute path or a repeated slash.
         let folder = if folder == Path::new("") {
             PathBuf::from("/")
         } else {
@@ -67,7 +67,7 @@ fn part_text<'a>(part: &'a Part, cell: &'a str) -> Option<&'a str> {
     }
 }
 
-/// Also with a number before the extension, as a name gets it that is taken.
+/// Whether a file name matches, also with a number before the extension, as added to a name that is already used.
 fn is_like_file(parts: &[Part], cell: &str, name: &str) -> bool {
     if is_like(parts, cell, name) {
         return true;
@@ -102,7 +102,7 @@ fn is_like(parts: &[Part], cell: &str, name: &str) -> bool {
     }
 }
 
-/// What comes behind a text of this shape, in which `d` is a digit.
+/// The rest of `name` after a text of this shape, in which `d` stands for a digit.
 fn shaped<'a>(shape: &str, name: &'a str) -> Option<&'a str> {
     let (text, rest) = name.split_at_checked(shape.len())?;
     let fits = |(shape, byte): (u8, u8)| match shape {

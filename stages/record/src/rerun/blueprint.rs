@@ -1,5 +1,5 @@
-//! How the viewer opens: robot and events on the left, a plot a joint and the detectors on the
-//! right; a tab a cell.
+//! Initial layout of the viewer: robot and events on the left, a plot per joint and the detectors on the right, and a
+//! tab per cell.
 
 pub(super) mod explanation;
 mod properties;
@@ -25,20 +25,20 @@ use super::tracks::STAMP;
 use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
 
-/// How much of the past a live plot shows \[ns\].
+/// Time window of a live plot \[ns\].
 /// Tuned: by eye, for the picture; no number depends on it.
 const LIVE_WINDOW_NS: i64 = 30_000_000_000;
 
-/// What the layout is for.
+/// Purpose of the layout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
-    /// A stream that goes on.
+    /// A live stream.
     Live,
     /// A file.
     File,
 }
 
-/// The layout's messages.
+/// Returns the messages of the layout.
 pub(super) fn messages(
     streams: &Streams,
     painter: &Painter,
@@ -156,7 +156,7 @@ impl Layout<'_> {
             .into()
     }
 
-    /// A plot a joint: measured, expected and what is between them.
+    /// One plot per joint: measured and expected effort, and the residual.
     fn joints(&mut self, cell: usize) -> Vec<ContainerLike> {
         let efforts = |streams: &Streams, stream: &Stream| match stream.kind {
             SampleKind::JointState => {
@@ -202,7 +202,7 @@ impl Layout<'_> {
         plots
     }
 
-    /// A plot a detector: its score and its threshold, or what the score is the largest of.
+    /// One plot per detector: its score and threshold, or the components whose maximum is the score.
     fn scores(&mut self, cell: usize) -> Vec<ContainerLike> {
         let mut plots = Vec::new();
         let detectors = self.streams.all.iter().enumerate();
@@ -245,7 +245,7 @@ impl Layout<'_> {
     }
 }
 
-/// What the axis of a detector's score shows.
+/// Unit on the axis of a detector's score.
 fn unit_of(stream: &Stream) -> String {
     match stream.score_unit.as_str() {
         "" => " (no unit)".to_owned(),
@@ -253,7 +253,7 @@ fn unit_of(stream: &Stream) -> String {
     }
 }
 
-/// What the legend says of the threshold: its value, once that is known.
+/// Legend of the threshold, with its value if known.
 fn threshold_name(value: Option<f64>) -> String {
     let value = value.filter(|value| value.is_finite());
     let value = value.map_or_else(String::new, |value| {
@@ -269,12 +269,12 @@ fn threshold_name(value: Option<f64>) -> String {
     format!("threshold{value} (alarm from here on)")
 }
 
-/// Two plots a row, more where there would be more than five rows.
+/// Number of plots per row: two, or more to avoid more than five rows.
 fn plots_a_row(plots: usize) -> usize {
     plots.div_ceil(5).max(2)
 }
 
-/// Plots in rows; the last row's are wider if they are fewer. (A grid would leave a hole.)
+/// Arranges plots in rows. Fewer plots in the last row are wider, whereas a grid would leave a gap.
 fn in_rows(plots: Vec<ContainerLike>) -> ContainerLike {
     let a_row = plots_a_row(plots.len());
     let mut plots = plots.into_iter();
@@ -285,7 +285,7 @@ fn in_rows(plots: Vec<ContainerLike>) -> ContainerLike {
     Vertical::new(rows).into()
 }
 
-/// Of an entity with a series a joint, the one of a joint.
+/// Shows the series of one joint of an entity with one series per joint.
 fn one_of(count: usize, joint: usize, label: &str, colour: Rgba32) -> SeriesLines {
     let names = (0..count).map(|j| Name::from(if j == joint { label } else { "other joints" }));
     SeriesLines::new()
@@ -302,7 +302,7 @@ fn line(label: &str, colour: Rgba32) -> SeriesLines {
         .with_widths([1.5_f32])
 }
 
-/// An eye and the point that it looks at \[m\].
+/// Positions of eye and target of a 3D view \[m\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ViewPoint {
     pub eye_m: [f32; 3],

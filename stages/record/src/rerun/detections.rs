@@ -1,9 +1,10 @@
-//! What a detector's stream draws: score and threshold, its state as a band, events in words, the
-//! touched link's colour and the force. Arrow and colour show the contact as far as it is known by then: force and link
-//! of the sample with the largest score so far; so they come to what the words say at its end. And where the detector
-//! tells of them the force's frequency content, with
-//! the state behind it, and the directions of force and motion (figures 1 and 2 of Salt Ducaju et al., "Fast
-//! Contact Detection and Classification for Kinesthetic Teaching in Robots using only Embedded Sensors", 2022).
+//! Entities of a detector's stream: score and threshold, its state as a band, events in words, the colour of the
+//! touched link, and the force. Arrow and colour show the estimate so far: force and link of the sample with the
+//! largest score. At the end of the contact they agree with the text.
+//!
+//! If the detector reports them, there are also the frequency content of the force, with the state as background, and
+//! the directions of force and motion. See figures 1 and 2 of Salt Ducaju et al., "Fast Contact Detection and
+//! Classification for Kinesthetic Teaching in Robots using only Embedded Sensors", 2022.
 
 use rerun::archetypes::{StateConfiguration, TextLog};
 use rerun::{EntityPath, Rgba32, TextLogLevel};
@@ -18,15 +19,15 @@ use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
 use crate::words::{Severity, headline, loaded_joints, over};
 
-/// Length of a force's arrow: 100 N to the metre, so that a push by hand is as long as a forearm.
+/// Scale of force arrows \[m/N\]: a metre for 100 N, so that a push by hand is as long as a forearm.
 /// Tuned: by eye, for the picture; no number depends on it.
 const M_PER_N: f64 = 0.01;
-/// Length of a unit vector's arrow \[m\].
+/// Length of a direction arrow \[m\].
 /// Tuned: by eye, for the picture; no number depends on it.
 const DIRECTION_M: f64 = 0.3;
 
-/// A state that stays is told again after this time \[ns\], for a viewer that came late.
-/// Resolution: size of the stream, against how long a late viewer waits.
+/// Repetition period of an unchanged state, for viewers that connect later \[ns\].
+/// Resolution: size of the stream, against the waiting time of such a viewer.
 const STATE_PERIOD_NS: u64 = 1_000_000_000;
 
 /// The tracks of one detector.
@@ -39,16 +40,16 @@ pub(super) struct DetectionTracks {
     events_entity: EntityPath,
     force: ArrowTrack,
     directions: ArrowTrack,
-    /// From the first sample that has it.
+    /// Frequency content; present from the first sample that has it.
     content: Option<Content>,
-    /// State that was told last, and when.
+    /// State and stamp of the last state row \[ns\].
     told: Option<(Name, i64)>,
-    /// Where the arrow of the force ends: it moves with the touched link \[m\].
+    /// End point of the force arrow, which moves with the touched link \[m\].
     arrow_m: Option<[f64; 3]>,
     newest_threshold: Option<f64>,
 }
 
-/// The force's frequency content, and the states behind it.
+/// The frequency content of the force, with the states as background.
 #[derive(Debug)]
 struct Content {
     norms: ScalarTrack,
@@ -78,32 +79,32 @@ impl Content {
     }
 }
 
-/// Where a detector's score is drawn.
+/// Entity of a detector's score.
 pub(super) fn score_entity(stream: &Stream) -> EntityPath {
     entity(&stream.topic, &[&stream.label, "score"])
 }
 
-/// Where its threshold is drawn.
+/// Entity of a detector's threshold.
 pub(super) fn threshold_entity(stream: &Stream) -> EntityPath {
     entity(&stream.topic, &[&stream.label, "threshold"])
 }
 
-/// Where the force's frequency content is drawn, and the states behind it.
+/// Parent entity of the force's frequency content and of the states behind it.
 pub(super) fn content_entity(stream: &Stream) -> EntityPath {
     entity(&stream.topic, &[&stream.label, "content"])
 }
 
-/// Where the content by direction is drawn. The viewer draws in the order of names: in front of the bands.
+/// Entity of the content by direction. The viewer draws in the order of names, so it is in front of the bands.
 pub(super) fn norms_entity(stream: &Stream) -> EntityPath {
     entity(&stream.topic, &[&stream.label, "content", "norms"])
 }
 
-/// Where its state is drawn.
+/// Entity of a detector's state.
 pub(super) fn state_entity(stream: &Stream) -> EntityPath {
     entity(&stream.topic, &[&stream.label, "state"])
 }
 
-/// Where its events are told.
+/// Entity of a detector's event log.
 pub(super) fn events_entity(stream: &Stream) -> EntityPath {
     entity(&stream.topic, &[&stream.label, "events"])
 }
@@ -144,17 +145,17 @@ impl DetectionTracks {
         })
     }
 
-    /// The newest threshold.
+    /// The latest threshold.
     pub fn newest_threshold(&self) -> Option<f64> {
         self.newest_threshold
     }
 
-    /// Whether the detector tells of the force's frequency content.
+    /// Whether the detector reports the frequency content of the force.
     pub fn has_content(&self) -> bool {
         self.content.is_some()
     }
 
-    /// Takes a detection of the stream number `index`; the recording began at `start_ns`.
+    /// Adds a detection of the stream number `index`; the recording began at `start_ns`.
     pub fn accept(
         &mut self,
         (detection, told): (&Detection, &Told<'_>),
@@ -206,7 +207,7 @@ impl DetectionTracks {
     fn draw_arrows(&mut self, detection: &Detection, open: Option<&Contact>) {
         let header = &detection.header;
         let point_m = detection.point_m;
-        // The force ends where it acts; directions begin there.
+        // The force arrow ends at the point of application; the direction arrows begin there.
         let force = open.and_then(|open| Some((open, open.peak()?)));
         self.arrow_m = force.map(|(open, peak)| {
             let is_there = header.has(flags::FORCE) && detection.link == open.link;
@@ -246,7 +247,7 @@ impl DetectionTracks {
         store: &Store,
     ) -> Result<(), RecordError> {
         let mut text = format!("{seconds:.2} s: {}", headline(detection));
-        // A watch reports a change of the arm once it is sure.
+        // A watch reports a change of the arm only when its estimate is final.
         if open.size.is_none() {
             let force = open.peak().map(|peak| format!(": {:.0} N", peak.norm_n()));
             text += &format!(" (first guess{})", force.unwrap_or_default());
@@ -290,7 +291,7 @@ impl DetectionTracks {
         self.state.flush(store, out)?;
         self.force.flush(store, out)?;
         self.directions.flush(store, out)?;
-        // Events hold the looks of the content, too.
+        // The rows of events also include the styles of the content.
         self.events.flush(out)?;
         match &mut self.content {
             Some(content) => content.flush(store, out),
@@ -299,7 +300,7 @@ impl DetectionTracks {
     }
 }
 
-/// The joints that felt a contact, as the end of a sentence.
+/// The joints that detected a contact, as the end of a sentence.
 fn seen_by(contact: &Contact, joints: &[String]) -> String {
     let joints = loaded_joints(contact.joints, joints);
     if joints.is_empty() {

@@ -1,11 +1,11 @@
-//! The picture of an explanation: measured effort beside the twin's before and after its correction, in words what was
-//! found, and when what acts in time did.
+//! The picture of an explanation: measured effort with the twin's effort before and after correction, the findings in
+//! words, and the times of temporary effects.
 //!
-//! By recording and joint, an entity each: `<recording>/<joint>/effort` (series measured, twin, corrected) and
-//! `<recording>/<joint>/residual` (before, after); by recording and event `<recording>/events/<number>`, told in
-//! `<recording>/log`; `robot/<link>`, the robot as it moves in the first recording, moved by `transforms`; and
-//! `explanation`, the text. On the importer's timelines, and on `recording_time`, which begins
-//! with each recording, so that all can be laid over each other.
+//! For each recording and joint there are the entities `<recording>/<joint>/effort` (series measured, twin,
+//! corrected) and `<recording>/<joint>/residual` (before, after). Events are `<recording>/events/<number>`, with
+//! their text in `<recording>/log`. The robot of the first recording is `robot/<link>`, moved by `transforms`. The
+//! text is `explanation`. All use the importer's timelines, and `recording_time`, which starts at zero in each
+//! recording, so that recordings can be overlaid.
 
 use std::path::Path;
 
@@ -30,10 +30,10 @@ use super::store::{Store, entity, unserializable};
 use super::tracks::{LOG_TIME, PUBLISH_TIME, STAMP, Times};
 use crate::error::RecordError;
 
-/// Seconds from the start of each recording: the timeline that the picture opens on.
+/// Initial timeline of the picture: seconds from the start of each recording.
 pub(super) const RECORDING_TIME: &str = "recording_time";
 
-/// What the picture of an explanation shows.
+/// Content of the picture of an explanation.
 #[derive(Debug, Clone, Default)]
 pub struct Explanation {
     /// Name of the case.
@@ -42,29 +42,29 @@ pub struct Explanation {
     pub effort_unit: String,
     /// Verdict and findings, in Markdown.
     pub text_markdown: String,
-    /// The recordings; the first is the one that is shown first.
+    /// The recordings, in the order of display.
     pub recordings: Vec<ExplainedRecording>,
-    /// What acts for a while or from some time on.
+    /// Effects that are temporary or begin at some time.
     pub events: Vec<ExplainedEvent>,
-    /// The robot, where there is one.
+    /// The robot, if there is one.
     pub robot: Option<ExplainedRobot>,
 }
 
 /// The robot in the picture of an explanation.
 #[derive(Debug, Clone)]
 pub struct ExplainedRobot {
-    /// The robot; its joints are those of each recording.
+    /// Model of the robot; its joints are those of each recording.
     pub model: Model,
-    /// The links in or at which something was found.
+    /// The links with findings.
     pub found: Vec<String>,
 }
 
 /// A recording in the picture of an explanation.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExplainedRecording {
-    /// Its name: no two have the same.
+    /// Its unique name.
     pub name: String,
-    /// Whether nothing was fitted on it.
+    /// Whether it was held out from the fit.
     pub held_out: bool,
     /// Stamp of its first sample \[ns since the epoch\].
     pub start_ns: i64,
@@ -72,7 +72,7 @@ pub struct ExplainedRecording {
     pub joints: Vec<ExplainedJoint>,
 }
 
-/// A joint's efforts in a recording, all of the same number of samples; what one series has more is not drawn.
+/// A joint's efforts in a recording, with the same number of samples; surplus samples of a series are not drawn.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExplainedJoint {
     /// Its name.
@@ -83,36 +83,36 @@ pub struct ExplainedJoint {
     pub position: Vec<f64>,
     /// Measured effort \[effort unit\].
     pub measured: Vec<f64>,
-    /// Effort of the twin as it was.
+    /// Effort of the twin before correction \[effort unit\].
     pub twin: Vec<f64>,
-    /// Effort of the corrected twin.
+    /// Effort of the corrected twin \[effort unit\].
     pub corrected: Vec<f64>,
 }
 
-/// A finding that has a time.
+/// A finding with a time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExplainedEvent {
-    /// The recording; all if absent.
+    /// The recording; all recordings if absent.
     pub recording: Option<String>,
-    /// When it begins, since the recording's first sample \[s\].
+    /// Beginning, relative to the recording's first sample \[s\].
     pub start_s: f64,
-    /// When it ends; with the recording if absent.
+    /// End, relative to the recording's first sample; the end of the recording if absent \[s\].
     pub end_s: Option<f64>,
-    /// What it is, in a few words: a label.
+    /// Short label.
     pub label: String,
-    /// What it is, in a sentence.
+    /// Description in a sentence.
     pub sentence: String,
 }
 
-/// Writes the picture, with its layout, to a Rerun file. It has `.part` at the end of its name until it is whole.
+/// Writes the picture with its layout to a Rerun file, whose name ends with `.part` until it is complete.
 ///
 /// # Errors
 ///
-/// If the file cannot be written or Rerun does not take the data.
+/// If the file cannot be written or Rerun cannot encode the data.
 pub fn write_explanation(path: &Path, explanation: &Explanation) -> Result<(), RecordError> {
-    // Whoever asks for it has made sure that nothing is lost.
+    // The caller has checked that the existing file may be replaced.
     let mut file = PictureFile::create(path, Existing::Replace)?;
-    // The viewer keeps one layout per application: another case, another layout.
+    // The viewer stores one layout per application, so each case is an application.
     let application =
         ApplicationId::new_or_unknown(format!("tauscope explain {}", explanation.case));
     let store = Store {
@@ -138,7 +138,7 @@ pub fn write_explanation(path: &Path, explanation: &Explanation) -> Result<(), R
 }
 
 impl Explanation {
-    /// The robot as it moves in the first recording.
+    /// Draws the robot with the motion of the first recording.
     fn draw_robot(
         &self,
         store: &Store,
@@ -179,32 +179,32 @@ impl Explanation {
     }
 }
 
-/// Where the text is.
+/// Entity of the text.
 pub(super) fn text_entity() -> EntityPath {
     entity("explanation", &[])
 }
 
-/// Where a joint's efforts are.
+/// Entity of a joint's efforts.
 pub(super) fn effort_entity(recording: &str, joint: &str) -> EntityPath {
     entity("", &[recording, joint, "effort"])
 }
 
-/// Where its residuals are.
+/// Entity of a joint's residuals.
 pub(super) fn residual_entity(recording: &str, joint: &str) -> EntityPath {
     entity("", &[recording, joint, "residual"])
 }
 
-/// Where an event is.
+/// Entity of an event.
 pub(super) fn event_entity(recording: &str, number: usize) -> EntityPath {
     entity("", &[recording, "events", &number.to_string()])
 }
 
-/// Where a recording's events are told.
+/// Entity of a recording's event log.
 pub(super) fn log_entity(recording: &str) -> EntityPath {
     entity("", &[recording, "log"])
 }
 
-/// The events of a recording with their numbers.
+/// Events of a recording with their numbers.
 pub(super) fn events_of<'a>(
     explanation: &'a Explanation,
     recording: &'a ExplainedRecording,
@@ -221,7 +221,7 @@ pub(super) fn events_of<'a>(
 }
 
 impl ExplainedRecording {
-    /// When it ends \[s\].
+    /// Time of the last sample \[s\].
     fn end_s(&self) -> f64 {
         let times = self.joints.iter().flat_map(|joint| &joint.time_s);
         times.copied().filter(|t| t.is_finite()).fold(0.0, f64::max)
@@ -229,8 +229,8 @@ impl ExplainedRecording {
 }
 
 impl ExplainedJoint {
-    /// How far a plot of the residuals must reach to both sides \[effort unit\]: not less than a twentieth of the
-    /// effort, so that noise looks like noise.
+    /// Symmetric range of a residual plot \[effort unit\], at least a twentieth of the effort, so that noise is not
+    /// magnified.
     pub(super) fn residual_range(&self) -> Option<f64> {
         let residuals = |twin: &[f64]| -> f64 {
             let residuals = self.measured.iter().zip(twin).map(|(m, e)| (m - e).abs());
@@ -299,7 +299,7 @@ fn lines(series: &[Series]) -> SeriesLines {
 }
 
 impl ExplainedEvent {
-    /// As a band, and in words where it begins.
+    /// Writes the event as a band, and as a text at its beginning.
     fn write(
         &self,
         number: usize,

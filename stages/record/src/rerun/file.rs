@@ -12,13 +12,13 @@ use tauscope_archive::whole_file::{self, Existing, part_of};
 
 use crate::error::{RecordError, says_full};
 
-/// An `.rrd` file, with `.part` at the end of its name until it is whole.
+/// An `.rrd` file, whose name ends with `.part` until it is complete.
 pub(super) struct PictureFile {
     path: PathBuf,
     part: PathBuf,
     existing: Existing,
     encoder: Encoder<BufWriter<File>>,
-    /// The same file, to sync it.
+    /// Second handle of the file, for syncing.
     file: File,
 }
 
@@ -33,8 +33,8 @@ pub(super) fn failed(part: &Path, error: &Cause) -> RecordError {
 }
 
 impl PictureFile {
-    /// Makes the file, and its folder where there is none. `existing` says what becomes of a file that
-    /// has the name when this one is complete.
+    /// Creates the file, and its folder if missing. `existing` is the policy for a file that already has the name
+    /// when this one is complete.
     pub fn create(path: &Path, existing: Existing) -> Result<Self, RecordError> {
         let part = part_of(path);
         let failed = |error: &Cause| failed(&part, error);
@@ -46,7 +46,7 @@ impl PictureFile {
         Self::begin(path, part, existing, &new)
     }
 
-    /// Makes the unfinished file `part` of what is to be `path`.
+    /// Creates the unfinished file `part`, which becomes `path`.
     pub fn begin(
         path: &Path,
         part: PathBuf,
@@ -80,8 +80,8 @@ impl PictureFile {
         }
     }
 
-    /// Completes it and gives it its name, which is told: the first that is free where a file that is
-    /// to be kept has it.
+    /// Completes and renames the file; returns its path. If an existing file with that name must be kept, the path is
+    /// the next unused name.
     pub fn finish(mut self) -> Result<PathBuf, RecordError> {
         self.encoder.finish().map_err(|error| self.failed(&error))?;
         self.encoder

@@ -1,4 +1,4 @@
-//! The picture in a viewer that may come and go.
+//! The picture in a viewer that may connect and disconnect at any time.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,21 +11,21 @@ use rerun::sink::{GrpcSink, GrpcSinkConnectionState, LogSink};
 use super::queue::{Counts, NewestQueue, Next};
 use crate::error::RecordError;
 
-/// Messages that wait for the viewer: some 10 s of one cell.
+/// Capacity of the queue to the viewer \[messages\], some 10 s of one cell.
 /// Resolution: memory.
 const QUEUE_CAPACITY: usize = 1024;
-/// How often a connection is looked after while nothing comes.
-/// Resolution: how soon a lost connection is noticed.
+/// Poll interval of the connection status while there are no messages.
+/// Resolution: delay until a lost connection is noticed.
 const LOOK: Duration = Duration::from_millis(50);
-/// How long to wait before connecting anew to a viewer that went away.
-/// Resolution: how soon a viewer is found again.
+/// Delay before reconnecting to a viewer that disconnected.
+/// Resolution: delay until a viewer is found again.
 const RECONNECT: Duration = Duration::from_millis(500);
-/// How long the end of a run waits for the viewer to take what is left.
-/// Resolution: how long the end of a run may take.
+/// Longest time that the end of a run waits for the viewer to receive the remaining messages.
+/// Resolution: acceptable duration of the end of a run.
 const EXIT_PATIENCE: Duration = Duration::from_secs(2);
 
-/// A stream to a viewer. Never makes the pipeline wait: what the viewer does not take in time gives
-/// way to what is newer. A viewer that comes later, or comes back, sees the picture from then on.
+/// A stream to a viewer. It never blocks the pipeline: messages that the viewer does not receive in time are dropped
+/// in favour of newer ones. A viewer that connects later, or reconnects, shows the picture from then on.
 pub(super) struct Live {
     queue: Arc<NewestQueue<LogMsg>>,
     ever_connected: Arc<AtomicBool>,
@@ -33,7 +33,7 @@ pub(super) struct Live {
 }
 
 impl Live {
-    /// Starts to connect. Each new connection is first sent the `preamble`.
+    /// Starts to connect. Each new connection begins with the `preamble`.
     pub fn start(url: &str, preamble: Vec<LogMsg>) -> Result<Self, RecordError> {
         let failed = |error: &dyn std::fmt::Display| RecordError::Connect {
             url: url.to_owned(),
@@ -48,7 +48,7 @@ impl Live {
             queue: Arc::clone(&queue),
             ever_connected: Arc::clone(&ever_connected),
         };
-        // Not joined: where no viewer was found, Rerun's client takes seconds to give up.
+        // The thread is not joined, because without a viewer Rerun's client needs seconds to give up.
         std::thread::Builder::new()
             .name("rerun_live".to_owned())
             .spawn(move || sender.run())
@@ -68,17 +68,17 @@ impl Live {
         self.queue.counts()
     }
 
-    /// Gives a viewer that is there a short time to take what is left.
+    /// Waits a short time for a connected viewer to receive the remaining messages.
     pub fn finish(&self) {
         self.queue.close();
         self.queue.wait_finished(EXIT_PATIENCE);
         let Counts { pushed, dropped } = self.queue.counts();
         let url = &self.url;
         if !self.ever_connected.load(Ordering::Relaxed) {
-            tracing::warn!("no Rerun viewer was there at {url}: the live picture went nowhere");
+            tracing::warn!("no Rerun viewer was running at {url}: the live picture was not shown");
         } else if dropped > 0 {
             tracing::warn!(
-                "the Rerun viewer at {url} was away or too slow for {dropped} of {pushed} messages"
+                "the Rerun viewer at {url} was disconnected or too slow for {dropped} of {pushed} messages"
             );
         }
     }
@@ -86,12 +86,12 @@ impl Live {
 
 impl Drop for Live {
     fn drop(&mut self) {
-        // The thread ends by itself.
+        // The thread ends when the queue is closed.
         self.queue.close();
     }
 }
 
-/// What runs in the thread.
+/// State of the sender thread.
 struct Sender {
     uri: ProxyUri,
     preamble: Vec<LogMsg>,
@@ -99,13 +99,13 @@ struct Sender {
     ever_connected: Arc<AtomicBool>,
 }
 
-/// How a connection came to its end.
+/// Reason for the end of a connection.
 enum Served {
-    /// There was none when the stream ended.
+    /// The stream ended before a connection was established.
     NeverConnected,
-    /// The viewer went away.
+    /// The viewer disconnected.
     Gone,
-    /// The stream has ended.
+    /// The stream ended.
     Ended,
 }
 
@@ -115,7 +115,7 @@ impl Sender {
             let sink = GrpcSink::new(self.uri.clone());
             match self.serve(&sink) {
                 Served::NeverConnected => {
-                    // Dropping a sink that still connects takes seconds.
+                    // Finish first, because dropping a sink that is still connecting takes seconds.
                     self.queue.finish();
                     return;
                 }
@@ -135,7 +135,7 @@ impl Sender {
         }
     }
 
-    /// Feeds one connection.
+    /// Sends the preamble and the queue to one connection.
     fn serve(&self, sink: &GrpcSink) -> Served {
         loop {
             match sink.status() {

@@ -1,4 +1,4 @@
-//! From samples to the picture: a state machine that gives out messages of a Rerun store.
+//! Conversion of samples to the messages of a Rerun store.
 
 use rerun::archetypes::TextLog;
 use rerun::{ApplicationId, EntityPath, StoreId, StoreKind, TextLogLevel};
@@ -12,58 +12,58 @@ use crate::contacts::Told;
 use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
 
-/// What the filtered expected effort is called, beside the residual.
+/// Entity name of the filtered expected effort, next to the residual.
 pub(super) const FILTERED_EXPECTED: &str = "filtered_expected";
 
-/// How much is gathered before it is sent.
+/// Batch limits for sending.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pace {
-    /// At most so many samples.
+    /// Largest number of samples per batch.
     pub samples: usize,
-    /// At most so much time between the first and the last stamp \[ns\].
+    /// Largest time between the first and the last stamp of a batch \[ns\].
     pub span_ns: i64,
 }
 
 impl Pace {
-    /// Few, large batches: small files that open fast.
+    /// Few large batches, for small files that open fast.
     pub const FILE: Self = Self {
         samples: 8192,
         span_ns: 5_000_000_000,
     };
-    /// Many, small batches: a picture that is a tenth of a second old.
+    /// Many small batches, for a live picture with 0.1 s delay.
     pub const LIVE: Self = Self {
         samples: 1000,
         span_ns: 100_000_000,
     };
 }
 
-/// Where the commands to a cell are told.
+/// Entity of the log of commands to a cell.
 pub(super) fn commands_entity(streams: &Streams, cell: usize) -> EntityPath {
     entity(&format!("{}/commands", streams.prefix(cell)), &[])
 }
 
-/// Turns samples into messages.
+/// Converter from samples to messages.
 #[derive(Debug)]
 pub(super) struct Painter {
     pub store: Store,
     pace: Pace,
-    /// Samples gathered, and the stamp of the first.
+    /// Number of gathered samples, and the stamp of the first \[ns\].
     gathered: usize,
     first_ns: i64,
-    /// Stamp of the recording's first sample.
+    /// Stamp of the recording's first sample \[ns\].
     start_ns: Option<i64>,
-    /// By cell.
+    /// Robots by cell.
     robots: Vec<Option<Robot>>,
-    /// By stream.
+    /// Tracks by stream.
     tracks: Vec<Tracks>,
-    /// By stream: entity and what its last report said of trouble.
+    /// Entity, and number of drops and restarts in the last health report, by stream.
     health: Vec<(EntityPath, u64)>,
-    /// By cell: where its commands are told.
+    /// Entity of the command log, by cell.
     commands: Vec<EntityPath>,
     texts: RowTrack,
 }
 
-/// What a stream draws.
+/// Tracks of a stream.
 #[derive(Debug)]
 enum Tracks {
     JointState {
@@ -73,7 +73,8 @@ enum Tracks {
     },
     TwinState {
         expected: ScalarTrack,
-        /// The same, filtered as it is for the residual: what friction does as a joint turns round is noise before.
+        /// Expected effort behind the residual's low-pass. Unfiltered, the friction at reversals of a joint looks
+        /// like noise.
         filtered_expected: ScalarTrack,
         residual: ScalarTrack,
         draws_robot: bool,
@@ -83,14 +84,14 @@ enum Tracks {
 }
 
 impl Painter {
-    /// A painter, and what has to be known of its store before anything else.
+    /// Creates a painter, and sends the messages that must precede all others.
     pub fn new(streams: &Streams, pace: Pace, out: &mut Out<'_>) -> Result<Self, RecordError> {
         let cells: Vec<_> = streams
             .cells
             .iter()
             .map(|cell| cell.name.as_str())
             .collect();
-        // The viewer keeps one layout per application: other cells, another layout.
+        // The viewer stores one layout per application, so each set of cells is an application.
         let application = ApplicationId::new_or_unknown(format!("tauscope {}", cells.join(" ")));
         let store = Store {
             id: StoreId::random(StoreKind::Recording, application),
@@ -138,12 +139,12 @@ impl Painter {
         self.robots[cell].as_ref()
     }
 
-    /// Whether the detector of a stream has told of the force's frequency content.
+    /// Whether the detector of a stream has reported the frequency content of the force.
     pub fn has_content(&self, stream: usize) -> bool {
         matches!(&self.tracks[stream], Tracks::Detection(tracks) if tracks.has_content())
     }
 
-    /// The newest threshold of the detector of a stream.
+    /// The latest threshold of the detector of a stream.
     pub fn threshold(&self, stream: usize) -> Option<f64> {
         match &self.tracks[stream] {
             Tracks::Detection(tracks) => tracks.newest_threshold(),
@@ -151,7 +152,7 @@ impl Painter {
         }
     }
 
-    /// Takes a sample of the stream number `index`, with what is known of its contact.
+    /// Adds a sample of the stream number `index`, with its contact.
     pub fn accept(
         &mut self,
         streams: &Streams,
@@ -161,7 +162,7 @@ impl Painter {
         let cell = streams.all[index].cell;
         let robot = self.robots[cell].as_mut();
         let stamp_ns = sample.header().stamp_ns;
-        // A report on how a stage fares may overtake the stage's first samples.
+        // A health report may overtake the first samples of its stage.
         if sample.kind() != SampleKind::Health {
             self.start_ns.get_or_insert(stamp_ns);
         }
@@ -183,7 +184,7 @@ impl Painter {
                 let detection = (detection, told);
                 tracks.accept(detection, of, start_ns, joints, robot, &self.store)?;
             }
-            // `Streams::find` lets only samples of the announced type through.
+            // `Streams::find` passes samples of the announced type only.
             (SampleRef::Detection(_), _) => {}
         }
         if self.gathered == 0 {
@@ -197,7 +198,7 @@ impl Painter {
         Ok(())
     }
 
-    /// Sends what was gathered.
+    /// Sends the gathered samples.
     pub fn flush(&mut self, out: &mut Out<'_>) -> Result<(), RecordError> {
         self.gathered = 0;
         for robot in self.robots.iter_mut().flatten() {
@@ -209,7 +210,7 @@ impl Painter {
         self.texts.flush(out)
     }
 
-    /// Says in words if a stage has lost something, or was started anew, since it last reported.
+    /// Logs a text if a stage has lost samples or was restarted since its last report.
     fn report(&mut self, index: usize, health: &Health) -> Result<(), RecordError> {
         let (entity, trouble_before) = &mut self.health[index];
         let trouble = health.dropped + health.restarts;
@@ -292,7 +293,7 @@ impl Tracks {
             return;
         };
         expected.push(&state.header, &state.expected_effort);
-        // Before the filters have settled it is their transient, which would set the plots' scale.
+        // The transient of unsettled filters would dominate the scale of the plots.
         if state.header.has(flags::READY) {
             filtered_expected.push(&state.header, &state.filtered_expected_effort);
             residual.push(&state.header, &state.residual);

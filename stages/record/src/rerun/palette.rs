@@ -1,49 +1,49 @@
-//! Colours: one meaning each, the same in every plot.
+//! Colours, with the same meaning in every plot.
 
 use rerun::Rgba32;
 use tauscope_dynamics::terms::{
     COULOMB_FRICTION, Effect, PAYLOAD, TORQUE_BIAS, TORQUE_GAIN, UNKNOWN, VISCOUS_FRICTION,
 };
 
-/// The measured effort.
+/// Measured effort.
 pub(super) const MEASURED: Rgba32 = Rgba32::from_rgb(86, 156, 238);
-/// The effort that the twin expects.
+/// Expected effort of the twin.
 pub(super) const EXPECTED: Rgba32 = Rgba32::from_rgb(255, 176, 66);
-/// The effort that a corrected twin expects, and what is left beside it.
+/// Expected effort of a corrected twin, and its residual.
 pub(super) const CORRECTED: Rgba32 = Rgba32::from_rgb(0, 200, 140);
-/// A time in which something acts on the arm.
+/// Interval in which an effect acts on the arm.
 pub(super) const EVENT: Rgba32 = Rgba32::from_rgb(204, 121, 167);
-/// The time in which it does not.
+/// Interval in which it does not.
 pub(super) const QUIET: Rgba32 = Rgba32::from_rgb(44, 50, 58);
-/// What is between them.
+/// Residual.
 pub(super) const RESIDUAL: Rgba32 = Rgba32::from_rgb(214, 102, 168);
-/// A detector's score.
+/// Score of a detector.
 pub(super) const SCORE: Rgba32 = Rgba32::from_rgb(94, 200, 178);
-/// What has to do with a contact: its threshold, the touched link, the force, the state.
+/// Contact: threshold, touched link, force and state.
 pub(super) const CONTACT: Rgba32 = Rgba32::from_rgb(232, 76, 76);
-/// Along the axes x, y and z.
+/// Axes x, y and z.
 pub(super) const AXES: [Rgba32; 3] = [
     Rgba32::from_rgb(255, 128, 110),
     Rgba32::from_rgb(130, 220, 120),
     Rgba32::from_rgb(120, 180, 255),
 ];
-/// Where a force grew to.
+/// Direction in which a force rose.
 pub(super) const RISE: Rgba32 = Rgba32::from_rgb(255, 176, 66);
-/// Where the tool went.
+/// Direction in which the tool moved.
 pub(super) const MOTION: Rgba32 = Rgba32::from_rgb(86, 156, 238);
-/// A change of the arm.
+/// Change of the arm.
 const CHANGE: Rgba32 = Rgba32::from_rgb(232, 148, 58);
-/// A link.
+/// Link.
 pub(super) const LINK: Rgba32 = Rgba32::from_rgb(176, 184, 196);
-/// Every second link, so that one sees where one ends.
+/// Every second link, to distinguish adjacent links.
 pub(super) const OTHER_LINK: Rgba32 = Rgba32::from_rgb(122, 132, 148);
 
-/// Behind the robot.
+/// Background of the robot.
 pub(super) const BACKGROUND: Rgba32 = Rgba32::from_rgb(22, 25, 30);
-/// The floor.
+/// Grid of the floor.
 pub(super) const GRID: Rgba32 = Rgba32::from_unmultiplied_rgba(150, 160, 175, 40);
 
-/// How a detector's states look: state, words, colour.
+/// Label and colour of each detector state, as (state, label, colour).
 pub(super) static STATES: [(&str, &str, Rgba32); 11] = [
     ("not_ready", "not ready", Rgba32::from_rgb(96, 100, 108)),
     ("free", "free", Rgba32::from_rgb(58, 132, 84)),

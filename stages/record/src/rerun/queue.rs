@@ -1,26 +1,26 @@
-//! The bounded queue before a live viewer: what is newest wins.
+//! Bounded queue for a live viewer, which drops the oldest items.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// What the queue has let go.
+/// Counters of the queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Counts {
-    /// Items taken in.
+    /// Number of items pushed.
     pub pushed: u64,
-    /// Items that gave way to newer ones.
+    /// Number of items dropped in favour of newer ones.
     pub dropped: u64,
 }
 
-/// What there is to take.
+/// Result of a pop.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Next<T> {
-    /// The oldest item that is left.
+    /// The oldest item.
     Item(T),
-    /// Nothing within the time.
+    /// No item within the timeout.
     Nothing,
-    /// Nothing, and nothing will follow.
+    /// No item, and the queue is closed.
     Closed,
 }
 
@@ -32,7 +32,7 @@ struct State<T> {
     finished: bool,
 }
 
-/// A queue of at most `capacity` items between a writer that never waits and a reader that may.
+/// A queue of at most `capacity` items between a writer that never blocks and a reader that may block.
 #[derive(Debug)]
 pub(super) struct NewestQueue<T> {
     capacity: usize,
@@ -56,7 +56,7 @@ impl<T> NewestQueue<T> {
         }
     }
 
-    /// Puts an item in; if there is no room, the oldest gives way.
+    /// Pushes an item; a full queue drops its oldest item.
     pub fn push(&self, item: T) {
         let mut state = self.lock();
         if state.items.len() == self.capacity {
@@ -68,7 +68,7 @@ impl<T> NewestQueue<T> {
         self.changed.notify_all();
     }
 
-    /// Takes the oldest item out; waits for it at most `timeout`.
+    /// Pops the oldest item; waits at most `timeout` for one.
     pub fn pop(&self, timeout: Duration) -> Next<T> {
         let mut state = self.wait(timeout, |state| state.items.is_empty() && !state.closed);
         match state.items.pop_front() {
@@ -78,29 +78,29 @@ impl<T> NewestQueue<T> {
         }
     }
 
-    /// The writer has put in its last item.
+    /// Closes the queue after the writer's last item.
     pub fn close(&self) {
         self.lock().closed = true;
         self.changed.notify_all();
     }
 
-    /// Waits at most `timeout` for the writer to put in its last item.
+    /// Waits at most `timeout` for the queue to be closed; returns whether it is.
     pub fn wait_closed(&self, timeout: Duration) -> bool {
         self.wait(timeout, |state| !state.closed).closed
     }
 
-    /// The reader has done with all that it will ever do.
+    /// Marks the reader as finished.
     pub fn finish(&self) {
         self.lock().finished = true;
         self.changed.notify_all();
     }
 
-    /// Waits at most `timeout` for the reader to have done; true if it has.
+    /// Waits at most `timeout` for the reader to finish; returns whether it has.
     pub fn wait_finished(&self, timeout: Duration) -> bool {
         self.wait(timeout, |state| !state.finished).finished
     }
 
-    /// What it has counted; what is still in it when the reader has done counts as dropped.
+    /// Returns the counters; items left after the reader has finished count as dropped.
     pub fn counts(&self) -> Counts {
         let state = self.lock();
         let left = if state.finished {
@@ -134,7 +134,7 @@ impl<T> NewestQueue<T> {
         state
     }
 
-    /// A thread that panicked while it held the lock left a queue that is still whole.
+    /// Locks the state. A poisoned lock is harmless, because no update is left half done.
     fn lock(&self) -> MutexGuard<'_, State<T>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }

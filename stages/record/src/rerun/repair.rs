@@ -1,4 +1,4 @@
-//! A picture that a dead recorder left unfinished: what can be read of it becomes a whole one.
+//! Repair of a picture that a crashed recorder left unfinished.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::BufReader;
@@ -10,12 +10,12 @@ use tauscope_archive::whole_file::{self, Existing};
 use super::file::{PictureFile, failed};
 use crate::error::RecordError;
 
-/// Repairs `part`, what a dead recorder left as `a.rrd.part`, to `a.rrd`, or to the first of `a.1.rrd`, ... that is free.
-/// `part` is removed then, or, where more than its torn end cannot be read, becomes `a.rrd.damaged`. Nothing where
-/// somebody writes it, or nothing is in it.
+/// Repairs `part`, a file `a.rrd.part` of a crashed recorder, to `a.rrd` or to the first unused name of `a.1.rrd`,
+/// ... Then `part` is removed. If more than its torn end is unreadable, it is renamed to `a.rrd.damaged` instead.
+/// Returns `None` if a process is writing the file or if it is empty.
 ///
 /// # Errors
-/// If no picture is in it, or the new file cannot be written; `part` stays then.
+/// If it contains no picture, or the new file cannot be written; then `part` is kept.
 pub(crate) fn repair_in_place(part: &Path) -> Result<Option<PathBuf>, RecordError> {
     let held = File::open(part).map_err(|error| failed(part, &error))?;
     if held.try_lock().is_err() {
@@ -26,7 +26,7 @@ pub(crate) fn repair_in_place(part: &Path) -> Result<Option<PathBuf>, RecordErro
         .map_err(|error| failed(part, &error))?
         .peekable();
     if messages.peek().is_none() {
-        // Killed before anything of it was written.
+        // The recorder was killed before it wrote anything.
         settle(part, false)?;
         return Ok(None);
     }
@@ -41,7 +41,7 @@ pub(crate) fn repair_in_place(part: &Path) -> Result<Option<PathBuf>, RecordErro
     let mut file = PictureFile::begin(&path, work.into(), Existing::Keep, &anew)?;
     let mut is_damaged = false;
     for message in messages {
-        // The torn end is silent: what lacks a part of itself is no message yet.
+        // A torn end gives no error: the decoder ignores an incomplete message.
         let Ok(message) = message else {
             is_damaged = true;
             break;
@@ -53,7 +53,7 @@ pub(crate) fn repair_in_place(part: &Path) -> Result<Option<PathBuf>, RecordErro
     Ok(Some(path))
 }
 
-/// What could be read of `part` is in another file.
+/// Removes `part`, or renames it if it is damaged, after its readable content was written to another file.
 fn settle(part: &Path, is_damaged: bool) -> Result<(), RecordError> {
     let settled = if is_damaged {
         whole_file::set_damaged_aside(part).map(drop)

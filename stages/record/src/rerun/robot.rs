@@ -1,5 +1,4 @@
-//! The robot in the picture: links as simple shapes, moved by the measured positions, coloured where
-//! they are touched.
+//! The robot in the picture: links as simple shapes, moved by the measured positions and coloured while touched.
 
 mod shapes;
 
@@ -18,14 +17,14 @@ use super::tracks::{PoseTrack, Times};
 use crate::error::RecordError;
 use crate::streams::{CellInfo, root};
 
-/// The robot moves at most so often \[ns\]: 50 pictures a second.
+/// Smallest interval between poses \[ns\]: 50 per second.
 /// Resolution: size of the stream.
 const POSE_PERIOD_NS: u64 = 20_000_000;
-/// Colours are told anew after this time \[ns\], for a viewer that came late.
-/// Resolution: size of the stream, against how long a late viewer waits.
+/// Repetition period of colours, for viewers that connect later \[ns\].
+/// Resolution: size of the stream, against the waiting time of such a viewer.
 const COLOUR_PERIOD_NS: u64 = 1_000_000_000;
 
-/// A robot that is drawn.
+/// A drawn robot.
 #[derive(Debug)]
 pub(super) struct Robot {
     entity: EntityPath,
@@ -35,9 +34,9 @@ pub(super) struct Robot {
     poses: PoseTrack,
     posed_ns: Option<i64>,
     coloured_ns: Option<i64>,
-    /// By stream, the link that its detector takes to be touched.
+    /// Touched link by the detector of each stream.
     touched: BTreeMap<usize, usize>,
-    /// Corners of the box that the links' origins were in \[m\].
+    /// Bounding box of the links' origins so far, as (lower, upper) corner \[m\].
     bounds: [[f64; 3]; 2],
 }
 
@@ -49,13 +48,13 @@ struct DrawnLink {
     entity: EntityPath,
     shapes: Shapes,
     colour: Rgba32,
-    /// Colours that were shown, and when.
+    /// Times and values of the shown colours.
     times: Times,
     shown: Vec<Rgba32>,
 }
 
 impl Robot {
-    /// A robot, and the messages that give its links their shapes; `times` gives those of its tracks.
+    /// Creates a robot and sends the messages with the shapes of its links; `times` creates the times of its tracks.
     pub fn new(
         model: &Model,
         prefix: &str,
@@ -112,7 +111,7 @@ impl Robot {
         Ok(robot)
     }
 
-    /// Gives an entity of arrows the robot's frame, and their looks.
+    /// Sets the frame and style of an entity of arrows.
     pub fn prepare_arrows(
         cell: &CellInfo,
         prefix: &str,
@@ -130,19 +129,19 @@ impl Robot {
         out(store.always(arrows, &looks)?)
     }
 
-    /// The entity that all links lie under.
+    /// Parent entity of all links.
     pub fn entity(&self) -> &EntityPath {
         &self.entity
     }
 
-    /// What a view of it shows: the links, and the forces on them.
+    /// Content of a view of the robot: the links and the forces on them.
     pub fn contents(&self) -> [String; 2] {
         let parent = self.entity.parent().unwrap_or_else(EntityPath::root);
         let forces = parent.join(&EntityPath::from_single_string("external_wrench"));
         [format!("{}/**", self.entity), format!("{forces}/**")]
     }
 
-    /// A place to look from that has all in view where the links have been so far.
+    /// View point that shows the whole volume in which the links have moved so far.
     pub fn view_point(&self) -> ViewPoint {
         let [low, high] = self.bounds;
         let size = (0..3)
@@ -151,7 +150,7 @@ impl Robot {
             .sqrt()
             .max(0.2);
         let middle: [f64; 3] = std::array::from_fn(|i| 0.5 * (low[i] + high[i]));
-        // From the front, the side and a little above.
+        // From the front and the side, slightly above.
         let towards_eye = [0.85, -0.75, 0.25];
         ViewPoint {
             eye_m: std::array::from_fn(|i| (middle[i] + size * towards_eye[i]) as f32),
@@ -159,7 +158,7 @@ impl Robot {
         }
     }
 
-    /// Moves the links to where the joint positions put them, unless they were moved just now.
+    /// Moves the links to the poses of these joint positions, at most once per period.
     pub fn pose(&mut self, header: &Header, position_rad: &JointArray) {
         let just_now = |before: i64| header.stamp_ns.abs_diff(before) < POSE_PERIOD_NS;
         if self.posed_ns.is_some_and(just_now) {
@@ -192,14 +191,14 @@ impl Robot {
         );
     }
 
-    /// Gives a link a colour of its own for all times to come.
+    /// Sets the permanent colour of a link.
     pub fn paint(&mut self, link: &str, colour: Rgba32) {
         if let Some(link) = self.links.iter_mut().find(|drawn| drawn.name == link) {
             link.colour = colour;
         }
     }
 
-    /// Colours the link that the detector of a stream takes to be touched.
+    /// Colours the touched link by the detector of a stream.
     pub fn touch(&mut self, header: &Header, stream: usize, link: Option<&str>) {
         let link = link.and_then(|name| self.links.iter().position(|link| link.name == name));
         let before = match link {
@@ -232,7 +231,7 @@ impl Robot {
     }
 }
 
-/// A link's frame; the same name in two cells is two frames.
+/// Name of a link's frame, unique across cells.
 fn frame(prefix: &str, link: &str) -> String {
     format!("{prefix}/{link}")
         .trim_start_matches('/')

@@ -1,7 +1,7 @@
-//! From columns to the messages of a Rerun store.
+//! Conversion of columns to the messages of a Rerun store.
 //!
-//! Made here and not by Rerun's `RecordingStream`: so nothing is buffered but what is bounded here,
-//! each error is seen here, and no environment variable has a say.
+//! It replaces Rerun's `RecordingStream`, so that buffers are bounded, errors are returned, and environment variables
+//! have no effect.
 
 use rerun::external::re_log_types::{SetStoreInfo, StoreInfo, StoreSource};
 use rerun::external::re_types_core::ChunkId;
@@ -13,7 +13,7 @@ use rerun::{
 
 use crate::error::RecordError;
 
-/// Takes a message.
+/// Receiver of messages.
 pub(super) type Out<'a> = dyn FnMut(LogMsg) -> Result<(), RecordError> + 'a;
 
 /// A recording or a blueprint.
@@ -32,7 +32,7 @@ impl Store {
         })
     }
 
-    /// Something that holds for all times.
+    /// Message with static data.
     pub fn always(
         &self,
         entity: &EntityPath,
@@ -41,7 +41,7 @@ impl Store {
         self.at(TimePoint::default(), entity, what)
     }
 
-    /// Something that holds from a time on.
+    /// Message with data that is valid from a time on.
     pub fn at(
         &self,
         time: TimePoint,
@@ -54,7 +54,7 @@ impl Store {
         self.message(entity, chunk)
     }
 
-    /// Many rows at once: one a time.
+    /// Message with many rows, one per time.
     pub fn columns(
         &self,
         entity: &EntityPath,
@@ -91,7 +91,7 @@ impl Store {
     }
 }
 
-/// Says which entity could not be serialized.
+/// Creates the error for an entity that cannot be serialised.
 pub(super) fn unserializable(entity: &EntityPath) -> impl Fn(SerializationError) -> RecordError {
     let entity = entity.to_string();
     move |error| RecordError::Encode {
@@ -100,7 +100,7 @@ pub(super) fn unserializable(entity: &EntityPath) -> impl Fn(SerializationError)
     }
 }
 
-/// The entity of a topic, and below it. Each part is taken literally.
+/// Entity path of a topic with further parts. Each part is literal.
 pub(super) fn entity(topic: &str, below: &[&str]) -> EntityPath {
     let parts = topic
         .split('/')

@@ -1,4 +1,4 @@
-//! Columns that grow until they are sent: one track an entity.
+//! Buffered columns, one track per entity.
 
 use rerun::archetypes::{Arrows3D, Scalars, SeriesLines, StateChange, Transform3D};
 use rerun::{AsComponents, EntityPath, Rgba32, TimeColumn, TimePoint, Timeline};
@@ -7,14 +7,14 @@ use tauscope_bus::Header;
 use super::store::{Out, Store, unserializable};
 use crate::error::RecordError;
 
-/// The timelines, named and filled as Rerun's own MCAP importer does, so that what is streamed and
-/// what is imported share an axis. The archive gives the stamp as publish time, so here too.
+/// Timelines with the names and content of Rerun's MCAP importer, so that streamed and imported data share an axis.
+/// The publish time is the stamp, as in the archive.
 pub(super) const LOG_TIME: &str = "message_log_time";
 pub(super) const PUBLISH_TIME: &str = "message_publish_time";
-/// The timeline that the viewer opens on: the stamp of the measurement.
+/// Initial timeline of the viewer: the stamp of the measurement.
 pub(super) const STAMP: &str = "ros2_timestamp";
 
-/// The time of a single row.
+/// Times of a single row.
 pub(super) fn time_point(header: &Header) -> TimePoint {
     [
         (LOG_TIME, header.received_ns),
@@ -27,12 +27,12 @@ pub(super) fn time_point(header: &Header) -> TimePoint {
     })
 }
 
-/// The times of the rows of a track.
+/// Times of the rows of a track.
 #[derive(Debug, Default)]
 pub(super) struct Times {
     received_ns: Vec<i64>,
     stamp_ns: Vec<i64>,
-    /// Name and zero of a timeline of its own that counts from the recording's start \[ns since the epoch\].
+    /// Name and zero of an additional timeline relative to the recording's start \[ns since the epoch\].
     since: Option<(&'static str, i64)>,
 }
 
@@ -42,7 +42,7 @@ impl Times {
         self.stamp_ns.push(header.stamp_ns);
     }
 
-    /// Times on a timeline that counts from `start_ns`, too.
+    /// Creates times with an additional timeline relative to `start_ns`.
     pub fn since(name: &'static str, start_ns: i64) -> Self {
         Self {
             since: Some((name, start_ns)),
@@ -66,7 +66,7 @@ impl Times {
     }
 }
 
-/// Numbers over time: one series a name.
+/// Numbers over time, one series per name.
 #[derive(Debug)]
 pub(super) struct ScalarTrack {
     pub entity: EntityPath,
@@ -76,7 +76,7 @@ pub(super) struct ScalarTrack {
 }
 
 impl ScalarTrack {
-    /// A track, and the message that names its series.
+    /// Creates a track and sends the message that names its series.
     pub fn new(
         entity: EntityPath,
         names: &[&str],
@@ -95,7 +95,7 @@ impl ScalarTrack {
         })
     }
 
-    /// A row; as many values as there are names are taken.
+    /// Adds a row with one value per name; further values are ignored.
     pub fn push(&mut self, header: &Header, values: &[f64]) {
         self.times.push(header);
         self.values.extend_from_slice(&values[..self.width]);
@@ -113,7 +113,7 @@ impl ScalarTrack {
     }
 }
 
-/// Where the links are, as a stream of transforms from the root's frame.
+/// Link poses over time, as transforms from the root's frame.
 #[derive(Debug)]
 pub(super) struct PoseTrack {
     pub entity: EntityPath,
@@ -121,7 +121,7 @@ pub(super) struct PoseTrack {
     times: Times,
     child_frames: Vec<String>,
     translations: Vec<[f32; 3]>,
-    /// x, y, z, w.
+    /// Rotations as x, y, z, w.
     quaternions: Vec<[f32; 4]>,
 }
 
@@ -169,21 +169,21 @@ pub(super) struct Arrow {
     pub label: String,
 }
 
-/// Arrows that move; a row without any ends them. They follow at most every [`ARROW_PERIOD_NS`].
+/// Moving arrows; an empty row removes them. They are updated at most every [`ARROW_PERIOD_NS`].
 #[derive(Debug)]
 pub(super) struct ArrowTrack {
     entity: EntityPath,
     times: Times,
-    /// Arrows by row.
+    /// Number of arrows by row.
     lengths: Vec<usize>,
     origins: Vec<[f32; 3]>,
     vectors: Vec<[f32; 3]>,
     labels: Vec<String>,
-    /// Stamp of the arrows that are shown now.
+    /// Stamp of the current arrows \[ns\].
     shown_ns: Option<i64>,
 }
 
-/// A viewer shows no more than 50 pictures a second \[ns\].
+/// Smallest interval between updates of arrows \[ns\]: 50 per second.
 /// Resolution: size of the stream.
 const ARROW_PERIOD_NS: u64 = 20_000_000;
 
@@ -201,7 +201,7 @@ impl ArrowTrack {
         }
     }
 
-    /// The arrows from now on.
+    /// Sets the arrows from now on.
     pub fn push<const N: usize>(&mut self, header: &Header, arrows: Option<[Arrow; N]>) {
         let just_now = |shown: i64| header.stamp_ns.abs_diff(shown) < ARROW_PERIOD_NS;
         match (&arrows, self.shown_ns) {
@@ -233,7 +233,7 @@ impl ArrowTrack {
     }
 }
 
-/// The states that something passes through.
+/// A sequence of states.
 #[derive(Debug)]
 pub(super) struct StateTrack {
     entity: EntityPath,
@@ -250,7 +250,7 @@ impl StateTrack {
         }
     }
 
-    /// The state from now on.
+    /// Sets the state from now on.
     pub fn push(&mut self, header: &Header, state: &str) {
         self.times.push(header);
         self.states.push(state.to_owned());
@@ -268,8 +268,8 @@ impl StateTrack {
     }
 }
 
-/// A state as bands of its colour along the foot of a plot, behind its lines: a thick line that changes its
-/// colour. (The viewer rounds its ends: one as thick as the plot is high would cover its neighbours.)
+/// A state as coloured bands along the bottom of a plot, behind its lines. It is drawn as a thick line that changes
+/// its colour. The viewer rounds the ends of lines, so a line as thick as the plot would cover its neighbours.
 #[derive(Debug)]
 pub(super) struct BandTrack {
     entity: EntityPath,
@@ -280,14 +280,14 @@ pub(super) struct BandTrack {
 }
 
 impl BandTrack {
-    /// Points.
+    /// Thickness \[points\].
     /// Tuned: by eye, for the picture; no number depends on it.
     const THICKNESS: f32 = 14.0;
-    /// A band that lasts is drawn on at least so often \[ns\].
+    /// Longest interval between points of an unchanged band \[ns\].
     /// Resolution: size of the stream.
     const PERIOD_NS: u64 = 20_000_000;
 
-    /// Bands, and the message that gives them their looks.
+    /// Creates a track and sends the message with its style.
     pub fn new(
         entity: EntityPath,
         name: &str,
@@ -307,12 +307,12 @@ impl BandTrack {
         })
     }
 
-    /// The colour from now on.
+    /// Sets the colour from now on.
     pub fn push(&mut self, header: &Header, colour: Rgba32) {
         let just_now = |shown_ns: i64| header.stamp_ns.abs_diff(shown_ns) < Self::PERIOD_NS;
         match self.shown {
             Some((before, shown_ns)) if before == colour && just_now(shown_ns) => return,
-            // Up to here.
+            // End of the previous band.
             Some((before, _)) if before != colour => {
                 self.times.push(header);
                 self.colours.push(before);
@@ -330,7 +330,7 @@ impl BandTrack {
         }
         let failed = unserializable(&self.entity);
         let colours = std::mem::take(&mut self.colours);
-        // Along the axis: norms are not below zero.
+        // Zero is the bottom of the plot, because norms are not negative.
         let values = Scalars::new(std::iter::repeat_n(0.0, colours.len()))
             .columns_of_unit_batches()
             .map_err(&failed)?;
@@ -342,14 +342,14 @@ impl BandTrack {
     }
 }
 
-/// Rows that are rare, each sent as it is with the next flush.
+/// Rare rows, each sent unbatched with the next flush.
 #[derive(Debug, Default)]
 pub(super) struct RowTrack {
     rows: Vec<rerun::log::LogMsg>,
 }
 
 impl RowTrack {
-    /// Takes a message as it is.
+    /// Adds a complete message.
     pub fn push_message(&mut self, message: rerun::log::LogMsg) {
         self.rows.push(message);
     }

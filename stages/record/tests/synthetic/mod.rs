@@ -1,4 +1,4 @@
-//! A made-up cell: a seven-joint arm that swings, and is pushed twice.
+//! A synthetic cell: an oscillating seven-joint arm that is pushed twice.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::f64::consts::TAU;
@@ -14,14 +14,14 @@ use tauscope_record::{CellInfo, Recorder, StreamInfo};
 pub const STEP_NS: i64 = 4_000_000;
 /// Stamp of the first sample \[ns\].
 pub const START_NS: i64 = 1_760_000_000_000_000_000;
-/// From when on the twin's filters have settled \[s\].
+/// Time at which the twin's filters have settled \[s\].
 const SETTLED_S: f64 = 0.8;
-/// Beginning and end of each push \[s\], and how hard it is.
+/// Beginning \[s\], end \[s\] and relative strength of each push.
 const PUSHES: [(f64, f64, f64); 2] = [(3.0, 4.2, 1.0), (7.0, 7.8, 0.6)];
 /// The detector's threshold.
 pub const THRESHOLD: f64 = 9.0;
 
-/// A seven-joint arm of cylinders, or of meshes that are not there.
+/// A seven-joint arm of cylinders, or of meshes whose files do not exist.
 pub fn arm(meshes: bool) -> Model {
     let joints = [
         ([0.0, 0.0, 0.333], 0.0),
@@ -62,7 +62,7 @@ pub fn arm(meshes: bool) -> Model {
     Model::from_urdf(&(urdf + "</robot>")).unwrap()
 }
 
-/// A cell with the arm, or with its joints' names alone.
+/// A cell with the arm, or with joint names only.
 pub fn cell(name: &str, model: Option<Model>) -> CellInfo {
     CellInfo {
         name: name.to_owned(),
@@ -72,7 +72,7 @@ pub fn cell(name: &str, model: Option<Model>) -> CellInfo {
     }
 }
 
-/// The usual three stages of a cell; their names end in `suffix`.
+/// The typical three stages of a cell; their names end with `suffix`.
 pub fn streams(cell: &str, suffix: &str) -> Vec<StreamInfo> {
     [
         ("ingest", SampleKind::JointState, None),
@@ -103,7 +103,7 @@ pub struct Instant {
 }
 
 impl Instant {
-    /// Hands them to the recorder, as if they came from stages whose names end in `suffix`.
+    /// Passes them to the recorder, as from stages whose names end with `suffix`.
     pub fn feed(&self, recorder: &mut Recorder, suffix: &str) {
         let stage = |name: &str| format!("{name}{suffix}");
         recorder
@@ -123,7 +123,7 @@ impl Instant {
     }
 }
 
-/// What the cell says over so many seconds.
+/// Samples of the cell over a duration.
 pub fn motion(seconds: f64) -> Vec<Instant> {
     let model = arm(false);
     let mut data = Data::new(&model);
@@ -167,7 +167,7 @@ fn instant(k: i64, model: &Model, data: &mut Data, onset_ns: &mut Option<i64>) -
         let friction = (4.0 - 0.4 * j as f64) * (8.0 * state.velocity[j]).tanh();
         let expected = gravity[j] * (1.0 + 0.2 * (pulsation * t).cos()) + friction;
         twin.expected_effort[j] = expected;
-        // What a source of noise would add, but the same each time.
+        // A deterministic substitute for noise.
         twin.residual[j] = push * touch[j] + 0.15 * (1e3 * t + j as f64).sin();
         state.effort[j] = expected + twin.residual[j];
     }

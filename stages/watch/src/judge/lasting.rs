@@ -1,33 +1,33 @@
-//! Whether a change lasts since its begin, and whether that begin was seen.
+//! Checks whether a change persists since its onset, and whether its onset was observed.
 
 use super::super::blocks::Ring;
 use super::super::moments::Compared;
 use super::super::usual::Usual;
 use super::{Candidate, Judge, Name};
 
-/// Parts of the time since the change, each of which must contain its share of it. Parts with too little information
-/// are joined.
+/// Parts of the time since the change, each of which must contain its share of the change. Parts with too little
+/// information are joined.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const PARTS: usize = 4;
-/// Share of a change that each part must contain; 1 is all of it.
+/// Admissible share of a change in each part; 1 is the whole change.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SHARE: std::ops::RangeInclusive<f64> = 0.4..=2.2;
-/// Parts with enough information that a change needs.
+/// Minimum number of parts with enough information.
 /// Statistical: a single part cannot show that the change lasts.
 const LEAST_PARTS: usize = 2;
-/// Newest blocks, which by themselves must contain their share of the change, too.
+/// Newest blocks that must contain their share of the change by themselves.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const NEWEST: usize = 2;
-/// A part has enough information if the standard error of its share is below this.
+/// Standard error of a part's share below which the part has enough information.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const UNCERTAIN: f64 = 0.2;
-/// Blocks before the change that must be there and at most are looked at, to see the change begin.
+/// Minimum and maximum number of blocks before the change in which its onset is checked.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const BEFORE: (usize, usize) = (3, 8);
 
 impl Judge {
-    /// Whether each part of the time since the change contains its share of it, the newest included. A contact that
-    /// ended or moved does not pass.
+    /// Returns whether each part of the time since the change contains its share of it, the newest included. A
+    /// contact that ended or moved does not pass.
     pub(super) fn lasts(&mut self, ring: &Ring, usual: &Usual<'_>, first: &Candidate) -> bool {
         let blocks = (0..=first.best.back).filter(|&back| !ring.back(back).excluded);
         let per_part = first.best.blocks.div_ceil(PARTS);
@@ -52,7 +52,7 @@ impl Judge {
             if self.window.blocks < per_part && at + 1 < first.best.blocks {
                 continue;
             }
-            // A part with too little information is joined with the one before it.
+            // A part with too little information is joined with the preceding one.
             if let Some(share) = self.share(usual, first) {
                 telling += 1;
                 if !SHARE.contains(&share) {
@@ -64,8 +64,8 @@ impl Judge {
         telling >= LEAST_PARTS
     }
 
-    /// Whether the change was seen to begin: blocks before it contain little of it. Otherwise the arm has drifted away
-    /// from the reference.
+    /// Returns whether the onset of the change was observed: the blocks before it contain little of it. Otherwise the
+    /// arm has drifted from the reference.
     pub(super) fn began(&mut self, ring: &Ring, usual: &Usual<'_>, first: &Candidate) -> bool {
         self.window.clear();
         for back in first.best.back + 1..ring.len() {
@@ -78,7 +78,7 @@ impl Judge {
         self.window.blocks >= BEFORE.0 && share.is_none_or(|share| share < *SHARE.start())
     }
 
-    /// Share of the change that the window contains; `None` if the window has too little information.
+    /// Returns the share of the change that the window contains; `None` if the window has too little information.
     fn share(&mut self, usual: &Usual<'_>, first: &Candidate) -> Option<f64> {
         let (share, information, noise) = match first.name {
             Name::Joint(j, kind) => {

@@ -1,24 +1,24 @@
-//! Runs of loud blocks, and how they end: as a contact, as a lasting change, or as neither.
+//! Runs of loud blocks and their outcome: a contact, a lasting change, or neither.
 
 use super::super::finding::{Cause, Finding};
 use super::super::moments::{Compared, JOINT_KINDS, Moments};
 use super::super::touch;
 use super::{FRESH, Monitor};
 
-/// Quiet blocks after which a contact may have ended.
+/// Minimum number of quiet blocks after a contact before it can be treated as ended.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const QUIET: usize = 3;
-/// A contact has ended if the quiet blocks contain less than this share of it.
+/// Share of a contact in the quiet blocks below which the contact has ended.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const OVER: f64 = 0.3;
-/// A change may be the cause of a run if its gain is above this share of the largest one.
+/// Ratio of a change's gain to the largest gain above which the change is a likely cause of a run.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LIKELY: f64 = 0.6;
-/// Information in the quiet blocks, in units of noise, that is enough to tell whether the cause is still there: the
-/// standard error of its share is then below 1/√10.
+/// Minimum information in the quiet blocks, in units of noise, to decide whether the cause persists: the standard
+/// error of its share is then below 1/√10.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const TELLING: f64 = 10.0;
-/// A longer run of loud blocks is no contact \[blocks\]: 10 s of motion.
+/// Maximum length of a contact \[blocks\]: 10 s of motion.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LONGEST_CONTACT: usize = 20;
 
@@ -31,24 +31,24 @@ pub(super) struct Run {
     blocks: usize,
     /// Loud blocks among them.
     loud: usize,
-    /// Quiet blocks since.
+    /// Quiet blocks since the newest loud one.
     quiet: usize,
-    /// Whether quiet blocks came before it, so that its begin was seen.
+    /// Whether quiet blocks preceded the run, so that its onset was observed.
     seen: bool,
 }
 
-/// How a run of loud blocks ended.
+/// Outcome of a run of loud blocks.
 pub(super) enum Told {
     /// A contact that ended.
     Contact(Finding),
-    /// A lasting change, and its blocks.
+    /// A lasting change, and its length \[blocks\].
     Lasting(Finding, usize),
-    /// A lasting deviation whose begin was not seen.
+    /// A lasting deviation whose onset was not observed.
     Unseen,
 }
 
 impl Monitor {
-    /// Adds the newest block to the run of loud blocks, if there is one, and says how the run ended.
+    /// Adds the newest block to the current run of loud blocks. Returns the run's outcome once it is decided.
     pub(super) fn follow_run(&mut self) -> Option<Told> {
         let newest = self.ring.back(0);
         let (loud, first_ns) = (newest.loud, newest.first_ns);
@@ -91,7 +91,7 @@ impl Monitor {
             let oldest = (run.quiet + run.blocks - 1).min(self.ring.len() - 1);
             let (link, explained) = touch::strongest(&self.ring, &self.usual(), run.quiet, oldest);
             finding.link = (explained > 0.0).then_some(link);
-            // With one block on either side, which may contain its begin and its end.
+            // Excludes one block on either side, too, because it may contain the contact's start or end.
             for back in run.quiet - 1..=(oldest + 1).min(self.ring.len() - 1) {
                 let block = self.ring.back_mut(back);
                 block.excluded = true;
@@ -112,13 +112,13 @@ impl Monitor {
             return Some(Told::Lasting(finding, run.blocks));
         }
         if run.quiet + run.blocks >= FRESH {
-            // Neither ended nor lasting: loud now and then. It becomes part of the reference.
+            // Neither ended nor lasting: loud intermittently. It becomes part of the reference.
             self.run = None;
         }
         None
     }
 
-    /// Whether the quiet blocks after a run show that its likely causes have ended at all its joints.
+    /// Returns whether the quiet blocks after a run show that its likely causes have ended at all its joints.
     fn is_over(&self, run: &Run) -> bool {
         let oldest = (run.quiet + run.blocks - 1).min(self.ring.len() - 1);
         (0..self.references.len())

@@ -1,4 +1,4 @@
-//! Learning: the reference and the usual gains, first from a stretch of motion, then updated with each block.
+//! Learning: the reference and the baseline gains, first from a segment of motion, then updated with each block.
 
 use super::super::blocks::{BLOCK_ROWS, BLOCK_S, Ring};
 use super::super::moments::{Moments, Reference};
@@ -9,13 +9,13 @@ use super::{LEAST_SHARE, Monitor, News, Phase};
 /// Time constant of the reference \[s of motion\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MEMORY_S: f64 = 150.0;
-/// A block whose energy is above this many times the median is not learned from.
+/// Ratio of a block's energy to the median above which the block is an outlier, excluded from learning.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const OUTLIER: f64 = 25.0;
-/// Blocks that the median is taken from at least.
+/// Minimum number of blocks for the median.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_BLOCKS: usize = 8;
-/// Share of a window's rows in which a joint must move for the window to count for it.
+/// Minimum share of a window's rows in which a joint moves, for the window to be used for this joint.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_MOVING: f64 = 0.3;
 
@@ -85,20 +85,20 @@ impl Monitor {
         }
     }
 
-    /// Learns the usual gains, each from a window and a reference without that window.
+    /// Learns the baseline gains, each from a window and a reference without that window.
     fn learn_scales(&mut self) {
         self.settle();
         for blocks in [1, Scale::SHORT, Scale::LONG] {
             self.leave_out(blocks, true);
         }
         self.settle();
-        // The payload's gain is in units of the noise, which is known only now.
+        // The payload's gain is in units of the noise, which the joints' gains determine.
         for blocks in [Scale::SHORT, Scale::LONG] {
             self.leave_out(blocks, false);
         }
     }
 
-    /// Leaves each window of this length out of the reference in turn, and learns from it: the usual gains of the
+    /// Leaves each window of this length out of the reference in turn, and learns from it: the baseline gains of the
     /// joints' own changes if `joints`, else that of a payload.
     fn leave_out(&mut self, blocks: usize, joints: bool) {
         for newest in 0..(self.ring.len() + 1).saturating_sub(blocks) {
@@ -129,7 +129,7 @@ impl Monitor {
         }
     }
 
-    /// Learns the usual gains from the oldest blocks, and adds the oldest of all to the reference.
+    /// Learns the baseline gains from the oldest blocks, and adds the oldest block to the reference.
     pub(super) fn learn_oldest(&mut self) {
         let oldest = self.ring.len() - 1;
         for blocks in [Scale::SHORT, Scale::LONG] {
@@ -169,7 +169,7 @@ impl Monitor {
         self.settle();
     }
 
-    /// Learns the usual gains from the window, beside the references in `aside`.
+    /// Learns the baseline gains from the window, compared with the references in `aside`.
     fn learn_window(&mut self, blocks: usize, joints: bool, payload: bool) {
         let body = self
             .window
@@ -188,12 +188,12 @@ impl Monitor {
         }
     }
 
-    /// Derives floors and noise from references and scales.
+    /// Derives floors and noise from references and baseline gains.
     pub(super) fn settle(&mut self) {
         for j in 0..self.references.len() {
             let rows = Scale::LONG as f64 * f64::from(BLOCK_ROWS);
             let least = LEAST_SHARE * LEAST_SHARE * self.references[j].effort_square();
-            // The gain of a deviation of that size in a long window is then just enough to be reported.
+            // With this floor, the gain of a deviation of `LEAST_SHARE` in a long window just reaches the threshold.
             self.floors[j] = least * rows / BEYOND;
             let usual = self.scales[j].iter().filter_map(Scale::usual);
             let (count, sum) = usual.fold((0.0, 0.0), |(n, sum), value| (n + 1.0, sum + value));

@@ -1,4 +1,4 @@
-//! What the monitor has learnt, handed to its next life.
+//! Saving and restoring of the learnt state.
 
 use super::super::blocks::Known;
 use super::super::memory::{Memory, OfJoint};
@@ -6,7 +6,7 @@ use super::super::moments::{Moments, Reference};
 use super::{Monitor, Phase};
 
 impl Monitor {
-    /// All that it has learnt.
+    /// Returns the learnt state.
     pub fn memory(&self) -> Memory {
         let joints = (0..self.references.len()).map(|j| OfJoint {
             moments: self.references[j].moments.numbers(),
@@ -20,7 +20,7 @@ impl Monitor {
         }
     }
 
-    /// Goes on from what an earlier life has learnt, if that is of as many joints.
+    /// Restores the learnt state of an earlier run and starts watching, if the state fits the number of joints.
     pub fn resume(&mut self, memory: &Memory) {
         if !memory.fits(self.references.len()) {
             return;

@@ -1,5 +1,5 @@
-//! Twin states of the demonstration arm, made without a twin: a motion, the measured effort of an arm that changes, and
-//! the expected effort of a twin with small errors.
+//! Synthetic twin states of the demonstration arm: a motion, the measured effort of an arm that changes, and the
+//! expected effort of a twin with small errors.
 
 use tauscope_bus::{Header, TwinState, flags};
 use tauscope_dynamics::lowpass::Butterworth2;
@@ -28,7 +28,7 @@ pub enum Act {
     Push(usize, [f64; 3]),
 }
 
-/// A change or contact, and when it begins and ends \[s\].
+/// A change or contact with its start and end \[s\].
 #[derive(Debug, Clone, Copy)]
 pub struct Episode {
     pub act: Act,
@@ -51,7 +51,7 @@ pub struct Stream {
     pub calibrated: bool,
     /// Share by which the viscous friction falls as the arm warms up, with a time constant of 20 minutes.
     pub warm_up: f64,
-    /// Time after which the motion changes \[s\].
+    /// Period between changes of the motion \[s\].
     pub program_s: f64,
     /// Duration of the rest at the end of each period \[s\].
     pub rest_s: f64,
@@ -83,7 +83,7 @@ impl Stream {
         let urdf = include_str!("../../../../tests/data/demo_arm.urdf");
         let nominal = Model::from_urdf(urdf).unwrap();
         let mut real = nominal.clone();
-        // Errors that a calibrated twin still has.
+        // Remaining errors of a calibrated twin.
         for (link, mass, com) in [
             ("link2", 0.12, [0.02, 0.0, 0.1]),
             ("link4", 0.08, [0.0, 0.03, 0.05]),
@@ -175,7 +175,7 @@ impl Stream {
         self.episodes.iter().filter(now).map(|episode| episode.act)
     }
 
-    /// The measured effort.
+    /// Returns the measured effort.
     fn effort(&mut self, t: f64, [q, qd, qdd]: &[[f64; 7]; 3]) -> [f64; 7] {
         let loaded = self.acts(t).any(|act| matches!(act, Act::Payload(..)));
         let model = if loaded { &self.loaded } else { &self.real };
@@ -227,12 +227,12 @@ impl Stream {
         effort
     }
 
-    /// Whether some joint moves at the next sample.
+    /// Returns whether any joint moves at the next sample.
     pub fn is_moving(&self) -> bool {
         self.motion(self.time_s())[1].iter().any(|v| v.abs() > 0.02)
     }
 
-    /// The next sample.
+    /// Returns the next sample.
     pub fn next_sample(&mut self) -> TwinState {
         let t = self.time_s();
         let motion = self.motion(t);

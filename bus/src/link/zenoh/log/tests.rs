@@ -38,7 +38,7 @@ fn what_did_not_arrive_goes_out_again() {
     assert_eq!(out(&mut log, now).len(), 10);
     log.taken("a", (4, 0), true, now);
     assert_eq!(out(&mut log, now), [4, 5, 6, 7, 8, 9]);
-    // Nothing is said of the last ones.
+    // The last samples are not acknowledged.
     log.look_back(now + AGAIN_AFTER / 2);
     assert!(out(&mut log, now).is_empty());
     log.look_back(now + AGAIN_AFTER);
@@ -73,7 +73,7 @@ fn one_that_comes_for_a_dead_one_goes_on_where_that_was() {
     log.join("b", 64, now);
     log.taken("b", (2, 0), false, now);
     assert_eq!(out(&mut log, now), [2, 3, 4]);
-    // One that left in order leaves nothing to take.
+    // A receiver that disconnected normally leaves no position to resume at.
     log.leave("b");
     push(&mut log, 5..7);
     log.join("c", 64, now);
@@ -114,7 +114,7 @@ fn a_frozen_one_holds_up_the_others_only_for_the_patience() {
     log.taken("a", (4, 0), false, now);
     assert!(out(&mut log, now).is_empty());
     assert_eq!(out(&mut log, now + PATIENCE), [4, 5, 6, 7]);
-    // It comes to its senses.
+    // The hung receiver recovers.
     log.taken("b", (4, 0), false, now + PATIENCE);
     log.taken("b", (4, 0), true, now + PATIENCE);
     assert_eq!(out(&mut log, now + PATIENCE), [4, 5, 6, 7]);

@@ -1,4 +1,4 @@
-//! The turn of the base that makes efforts match: a robot on a wall or a ceiling.
+//! Orientation of the base that makes efforts match: a robot on a wall or a ceiling.
 
 use nalgebra::Vector3;
 use tauscope_dynamics::{Data, gravity_effort};
@@ -6,15 +6,15 @@ use tauscope_dynamics::{Data, gravity_effort};
 use super::Trial;
 use crate::data::remedies::Remedy;
 
-/// Gravity after a turn of the base is as strong as before, up to this share: bodies in the URDF may be wrong by so much.
+/// Largest relative change of the magnitude of gravity for a turned base, from errors of the bodies in the URDF.
 /// Physical: masses of published URDFs are within a tenth of the real ones.
 const SAME_GRAVITY: f64 = 0.1;
-/// A base that is turned by less is found by the search as a tilt \[rad\].
+/// Smallest turn of the base; the search finds smaller ones as a tilt \[rad\].
 /// Physical: beyond it a sine is no longer near its angle.
 const TURNED_RAD: f64 = 0.5;
 
 impl Trial<'_> {
-    /// Roll and pitch of the base that fit best, if gravity is then as strong as before.
+    /// Returns the best-fitting roll and pitch of the base, if the magnitude of gravity stays the same.
     pub(super) fn base_turned(&self) -> Option<(Remedy, Vec<f64>)> {
         let (found, model_turned) = self.gravity()?;
         let was = Vector3::from(self.problem.model.gravity());
@@ -25,14 +25,14 @@ impl Trial<'_> {
         (same && upright && turned).then_some((remedy, model_turned))
     }
 
-    /// The direction of gravity in the base that fits best, if it is not that of the model.
+    /// Returns the best-fitting direction of gravity in the base, if it differs from that of the model.
     pub fn turned_gravity(&self) -> Option<Vector3<f64>> {
         let (found, _) = self.gravity()?;
         let was = Vector3::from(self.problem.model.gravity());
         (found.angle(&was) > TURNED_RAD).then(|| found.normalize())
     }
 
-    /// Gravity in the base that fits best \[m/s²\], and the twin's effort under it.
+    /// Returns the best-fitting gravity in the base \[m/s²\], and the twin's effort under it.
     fn gravity(&self) -> Option<(Vector3<f64>, Vec<f64>)> {
         let along = |axis: usize| {
             let mut gravity = [0.0; 3];
@@ -65,7 +65,7 @@ impl Trial<'_> {
     }
 }
 
-/// Roll and pitch of a base that sees gravity so, with a pitch of a quarter turn at most.
+/// Returns roll and pitch of a base in which gravity has this direction, with a pitch of at most a quarter turn.
 fn turn_to(gravity: &Vector3<f64>) -> [f64; 2] {
     let down = gravity.normalize();
     let sin_roll = (-down.y).clamp(-1.0, 1.0);

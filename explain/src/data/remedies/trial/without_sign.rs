@@ -1,16 +1,16 @@
-//! Efforts that are a magnitude: a drive that tells how much current flows, and not which way.
+//! Detection of efforts without sign: a drive that reports the magnitude of the current, not its direction.
 
 use super::{Counted, STRONG, Trial};
 use crate::data::remedies::{Reading, Remedy};
 
-/// Such an effort is below zero, by noise, in no more than this share of its rows; the motion requires torques of both
-/// signs in at least [`BOTH_SIGNS`] of them.
+/// Largest share of rows with a negative effort, by noise, and smallest share of rows with each sign of the required
+/// torque ([`BOTH_SIGNS`]).
 /// Tuned: by hand, on no recorded seeds; not swept.
 const BELOW_ZERO: f64 = 1e-3;
 const BOTH_SIGNS: f64 = 0.1;
 
 impl Trial<'_> {
-    /// The joints whose effort is never below zero, though the motion requires much of both signs.
+    /// Returns the joints whose effort is never negative, although the motion requires large efforts of both signs.
     pub fn without_sign(&self, model: &[f64], reading: &Reading) -> Vec<Remedy> {
         let lacks = |joint: &usize| {
             let rows = &self.rows[*joint];

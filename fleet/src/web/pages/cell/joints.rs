@@ -1,4 +1,4 @@
-//! The joints of a cell: what their residual is, what is normal, and what it is at their peers.
+//! The joints of a cell: their residual, their normal residual, and the residual of their peers.
 
 use maud::{Markup, html};
 use tauscope_publish::message::JointResidual;
@@ -26,9 +26,9 @@ pub fn section(snapshot: &Snapshot, view: &CellView, kept: &Kept, unit: &str) ->
         .and_then(|status| status.residual.as_ref());
     let Some(residual) = residual else {
         return html! { p.muted {
-            @if view.status.is_none() { "Nothing is known of the residual: the cell has told nothing yet." }
+            @if view.status.is_none() { "The residual is unknown: the cell has not sent a status yet." }
             @else {
-                "Nothing is known of the residual: the cell's " code { "publish" } " stage does not listen to its twin."
+                "The residual is unknown: the cell's " code { "publish" } " stage does not listen to its twin."
             }
         } };
     };
@@ -95,7 +95,7 @@ fn among_peers(snapshot: &Snapshot, view: &CellView, joint: &JointResidual) -> M
     }
 }
 
-/// The same joint's residual in the other cells with this robot \[effort unit\].
+/// Returns the residual of this joint in the other cells with this robot \[effort unit\].
 fn peers(snapshot: &Snapshot, view: &CellView, joint: &str) -> Vec<f64> {
     let Some(own) = &view.status else {
         return Vec::new();
@@ -115,7 +115,7 @@ fn peers(snapshot: &Snapshot, view: &CellView, joint: &str) -> Vec<f64> {
     named.map(|other| other.rms).collect()
 }
 
-/// The peers' median, and whether `value` lies far beyond what they differ by.
+/// Returns the peers' median, and whether `value` is an outlier among them.
 fn outlier(value: f64, mut peers: Vec<f64>) -> (f64, bool) {
     let middle = median(&mut peers);
     let mut deviations: Vec<f64> = peers.iter().map(|peer| (peer - middle).abs()).collect();

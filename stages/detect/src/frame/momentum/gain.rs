@@ -1,4 +1,4 @@
-//! The observer's usual gain.
+//! The observer's default gain.
 
 /// The papers' gain \[1/s\].
 /// Tuned: by Tajiri and Iwamoto (section IV-B), on their robot.

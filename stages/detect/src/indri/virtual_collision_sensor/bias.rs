@@ -1,21 +1,21 @@
-//! Learning and adaptation of the bias, the sensor's sensitivity (section 4): the block that estimates
+//! Learning and adaptation of the bias, which sets the sensor's sensitivity (section 4): the block that estimates
 //! it for a joint (equations 12 to 16, figure 9), and the machine that handles a request (figure 10).
 
 use super::learnt::LearntJoint;
 
-/// The bias of one joint: what is estimated beside the collision test, and what is applied in it.
+/// The bias of one joint: the estimate made in parallel with the collision test, and the bias applied in the test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bias {
     /// `Coll_Ident` \[effort unit\].
     ident: f64,
-    /// `Coll_0`, from which the adaptation began last.
+    /// `Coll_0`, from which the current adaptation started \[effort unit\].
     start: f64,
     /// `t_adapt` \[s\]; `None` while it is locked to zero.
     adapt_s: Option<f64>,
 }
 
 impl Bias {
-    /// `initial` (`Coll_bias0`) stays until somebody asks for learning.
+    /// Creates a bias of `initial` (`Coll_bias0`), constant until learning is requested.
     pub fn new(initial: f64) -> Self {
         Self {
             ident: 0.0,
@@ -24,7 +24,7 @@ impl Bias {
         }
     }
 
-    /// Goes on where an earlier life has come to.
+    /// Restores the bias of an earlier run.
     pub fn resume(learnt: &LearntJoint) -> Self {
         Self {
             ident: learnt.ident,
@@ -33,7 +33,7 @@ impl Bias {
         }
     }
 
-    /// What a later life goes on from.
+    /// Returns the state for [`resume`](Self::resume).
     pub fn learnt(&self) -> LearntJoint {
         LearntJoint {
             ident: self.ident,
@@ -42,34 +42,33 @@ impl Bias {
         }
     }
 
-    /// `Coll_Ident` \[effort unit\].
+    /// Returns `Coll_Ident` \[effort unit\].
     pub fn ident(&self) -> f64 {
         self.ident
     }
 
-    /// Equation 14: `Coll_bias` now, with the adaptation's time constant.
+    /// Returns the current `Coll_bias` by equation 14, with the adaptation's time constant.
     pub fn value(&self, time_constant_s: f64) -> f64 {
         match self.adapt_s {
             None => self.start,
-            // Arrived.
+            // The adaptation is complete.
             Some(_) if self.start.to_bits() == self.ident.to_bits() => self.ident,
             Some(t) => self.ident + (-t / time_constant_s).exp() * (self.start - self.ident),
         }
     }
 
-    /// Lets `dt_s` pass.
+    /// Advances the adaptation by `dt_s`.
     pub fn advance(&mut self, dt_s: f64) {
         if let Some(t) = &mut self.adapt_s {
             *t += dt_s;
         }
     }
 
-    /// The parallel test with `S_Ident` (equation 12) on a joint that is being tested, and where it
-    /// finds a virtual collision equation 13 and, once adapting, 16.
+    /// Runs the parallel test with `S_Ident` (equation 12) on a tested joint. For a virtual collision it applies
+    /// equation 13 and, during adaptation, equation 16.
     ///
-    /// `passes` is the largest |R| that the collision test itself lets pass: `Coll_Ident` is raised
-    /// up to there. What is beyond is an alarm, not evidence of the robot's usual behaviour (the
-    /// paper's robot has stopped by then).
+    /// `passes` is the largest |R| that the collision test accepts: `Coll_Ident` is raised at most to that level. A
+    /// larger |R| is an alarm and not normal behaviour of the robot (the paper's robot has stopped by then).
     pub fn observe(&mut self, residue: f64, model_error: f64, passes: f64, time_constant_s: f64) {
         let needed = residue.min(passes) - model_error;
         if needed <= self.ident {
@@ -82,32 +81,32 @@ impl Bias {
         self.ident = needed;
     }
 
-    /// The service Init: discards `Coll_Ident` and locks `t_adapt`; the bias stays as it is now.
+    /// Executes the service Init: discards `Coll_Ident` and locks `t_adapt`; the applied bias stays constant.
     pub fn init(&mut self, time_constant_s: f64) {
         self.start = self.value(time_constant_s);
         self.ident = 0.0;
         self.adapt_s = None;
     }
 
-    /// The service Set, equation 15: `Coll_Ident` is the bias from now on.
+    /// Executes the service Set, equation 15: applies `Coll_Ident` as the bias.
     pub fn set(&mut self) {
         self.start = self.ident;
     }
 
-    /// The service Adapt: unlocks `t_adapt`.
+    /// Executes the service Adapt: unlocks `t_adapt`.
     pub fn adapt(&mut self) {
         self.adapt_s = Some(0.0);
     }
 }
 
-/// What the machine does at a sample.
+/// Service that the machine calls at a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Service {
     /// Nothing.
     None,
     /// Init.
     Init,
-    /// Set, as learning ends.
+    /// Set, at the end of learning.
     Set,
     /// Adapt.
     Adapt,
@@ -116,23 +115,23 @@ pub(super) enum Service {
 /// The machine of figure 10.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum LearningState {
-    /// Waits for a request.
+    /// Waiting for a request.
     #[default]
     Idle,
-    /// A request has come: the estimation begins anew.
+    /// Requested: the estimation restarts.
     Init,
-    /// The estimation runs, for so long by now \[s\].
+    /// Estimating, with the elapsed time \[s\].
     Learning(f64),
-    /// What was learnt is applied, and adapts from now on.
+    /// Learnt: the estimate is applied, and adaptation starts.
     Adapt,
 }
 
 impl LearningState {
-    /// The step of a sample that came `dt_s` after the one before; `learning_s` is the time that
-    /// learning takes, `asked` the request.
+    /// Advances the machine by a sample, `dt_s` after the previous one. `learning_s` is the duration of learning;
+    /// `asked` is true if learning is requested.
     pub(super) fn step(&mut self, dt_s: f64, learning_s: f64, asked: bool) -> Service {
         let (next, service) = match *self {
-            // A request while one is being dealt with begins it anew.
+            // A request during learning restarts it.
             _ if asked => (Self::Init, Service::None),
             Self::Idle => (Self::Idle, Service::None),
             Self::Init => (Self::Learning(0.0), Service::Init),
@@ -162,10 +161,10 @@ mod tests {
         let mut bias = Bias::new(2.0);
         bias.observe(1.5, 1.0, f64::INFINITY, TAU);
         close(bias.ident(), 0.5);
-        // |R| <= S_Ident = 1 + 0.5: none.
+        // |R| <= S_Ident = 1 + 0.5: no virtual collision.
         bias.observe(1.4, 1.0, f64::INFINITY, TAU);
         close(bias.ident(), 0.5);
-        // Locked: the bias applied is the first one still (remark 3).
+        // Locked: the applied bias is still the initial one (remark 3).
         bias.advance(1000.0);
         close(bias.value(TAU), 2.0);
     }
@@ -176,7 +175,7 @@ mod tests {
         bias.observe(1.5, 1.0, f64::INFINITY, TAU);
         bias.set();
         bias.adapt();
-        // Equation 15: applied at once, and changed by nothing but a new estimate.
+        // Equation 15: applied at once, and changed only by a new estimate.
         close(bias.value(TAU), 0.5);
         bias.advance(30.0);
         close(bias.value(TAU), 0.5);
@@ -186,7 +185,7 @@ mod tests {
         bias.advance(60.0);
         let after = 0.9 - (-1.0_f64).exp() * 0.4;
         close(bias.value(TAU), after);
-        // Again, from where it has come to.
+        // Again, from the current value.
         bias.observe(2.0, 1.0, f64::INFINITY, TAU);
         close(bias.value(TAU), after);
         bias.advance(60.0);

@@ -1,4 +1,4 @@
-//! What the joints' currents do, for all versions of the sensor alike: what both work with is derived once where they may share.
+//! Evaluation of the joints' currents, common to both versions of the sensor and computed once where they share it.
 
 use tauscope_bus::{MAX_JOINTS, TwinState, flags};
 
@@ -12,14 +12,14 @@ pub(crate) struct Blocks {
     newest: Step,
 }
 
-/// What a sample brought.
+/// Result of a sample.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Step {
-    /// Time since the sample before; 0 at the first \[s\].
+    /// Time since the previous sample; 0 at the first \[s\].
     pub dt_s: f64,
-    /// Whether everything begins anew with it.
+    /// Whether the blocks were reset at this sample.
     pub anew: bool,
-    /// By joint.
+    /// State of the currents, by joint.
     pub currents: [Currents; MAX_JOINTS],
 }
 
@@ -32,7 +32,7 @@ impl Blocks {
         }
     }
 
-    /// Takes the next sample. A repeated stamp changes nothing.
+    /// Processes the next sample. A repeated stamp changes nothing.
     pub(super) fn update(&mut self, sample: &TwinState) -> &Step {
         let stamp_ns = sample.header.stamp_ns;
         let before_ns = self.newest_ns.replace(stamp_ns);

@@ -1,4 +1,4 @@
-//! The first bias (`Coll_bias0`) as the pipeline file gives it.
+//! The initial bias (`Coll_bias0`) in the pipeline file.
 
 use std::collections::BTreeMap;
 
@@ -6,26 +6,26 @@ use crate::frame::{ConfigError, joints};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// By joint the smallest effort that is a collision until something is learnt \[effort unit\].
+/// The smallest effort treated as a collision before learning, by joint \[effort unit\].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum FirstBias {
-    /// By the joint's name.
+    /// By joint name.
     ByName(BTreeMap<String, f64>),
     /// In URDF order.
     InOrder(Vec<f64>),
 }
 
 impl FirstBias {
-    /// These values, in the order of `joint_names`, by name.
+    /// Maps the values, in the order of `joint_names`, to the names.
     pub(super) fn named(joint_names: &[String], values: impl Iterator<Item = f64>) -> Self {
         Self::ByName(joint_names.iter().cloned().zip(values).collect())
     }
 
-    /// One value a joint, in the order of `joint_names`.
+    /// Returns one value per joint, in the order of `joint_names`.
     ///
     /// # Errors
-    /// If it is of other joints, or holds no size of an effort.
+    /// If the joints differ, or a value is negative or not finite.
     pub(crate) fn resolve(
         &self,
         detector: &'static str,

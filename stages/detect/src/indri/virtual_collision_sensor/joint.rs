@@ -6,68 +6,68 @@ use super::noise::MeasurementNoise;
 use super::phase::{Phase, PhaseMachine};
 use super::trend::{NoiseBounds, Trend};
 
-/// What tells what a joint's currents do.
+/// Settings of the trend detection and the model-error estimate of a joint's currents.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct BlockSettings {
     /// Cutoff of the low-pass on both currents \[Hz\].
     pub cutoff_hz: f64,
     /// Time between two updates of the model error in the steady state, `T_s` \[s\].
     pub period_s: f64,
-    /// Weight of equation 9.
+    /// Weight δ of equation 9.
     pub delta: f64,
 }
 
-/// What a joint's block works with.
+/// Settings of a joint's sensor block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Tuning {
-    /// What tells what its currents do.
+    /// Settings of its trend detection and model-error estimate.
     pub block: BlockSettings,
-    /// Factor of equation 17.
+    /// Factor α of equation 17.
     pub alpha: f64,
     /// Time constant of the adaptation, equation 14 \[s\].
     pub time_constant_s: f64,
 }
 
-/// What a joint's currents do.
+/// State of a joint's currents after a sample, independent of the bias.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Currents {
-    /// The state of figure 6.
+    /// State of the machine in figure 6.
     pub phase: Phase,
     /// |R|, equation 1 \[effort unit\].
     pub residue: f64,
     /// Estimated model error \[effort unit\].
     pub model_error: f64,
-    /// What noise may add \[effort unit\].
+    /// Margin for measurement noise, ν \[effort unit\].
     pub noise: f64,
 }
 
-/// What a joint's block makes of a sample.
+/// Result of a joint's sensor block for a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Reading {
-    /// What the currents are doing.
+    /// State of the machine in figure 6.
     pub phase: Phase,
     /// |R|, equation 1 \[effort unit\].
     pub residue: f64,
     /// Estimated model error \[effort unit\].
     pub model_error: f64,
-    /// `S_coll`, equations 4 and 17, and what noise may add \[effort unit\].
+    /// `S_coll` of equations 4 and 17, plus the margin for noise \[effort unit\].
     pub threshold: f64,
 }
 
 impl Reading {
-    /// |R| as a share of the threshold, whether the test is made or not.
+    /// Returns |R| relative to the threshold, regardless of whether the joint is tested.
     pub fn ratio(&self) -> f64 {
-        // A joint that has no current at all has no threshold either.
+        // The threshold of a joint without any current is zero.
         self.residue / self.threshold.max(f64::MIN_POSITIVE)
     }
 
-    /// Equation 3, which is not asked in the safe state.
+    /// Evaluates the collision test of equation 3; it is false in the safe state.
     pub fn collides(&self) -> bool {
         self.phase.is_tested() && self.residue > self.threshold
     }
 }
 
-/// What tells what one joint's currents do, whatever the bias.
+/// Trend detection and model-error estimate of one joint's currents, independent of the bias.
 #[derive(Debug, Clone)]
 pub(super) struct Block {
     omega_rad_s: f64,
@@ -92,7 +92,7 @@ impl Block {
         }
     }
 
-    /// Starts anew at these currents.
+    /// Resets the block to these currents.
     pub fn reset(&mut self, measured: f64, expected: f64) {
         self.measured.reset(measured);
         self.expected.reset(expected);
@@ -102,7 +102,7 @@ impl Block {
         self.model_error.reset();
     }
 
-    /// Takes the next currents, `dt_s` seconds after the ones before.
+    /// Processes the next currents, `dt_s` seconds after the previous ones.
     pub fn update(&mut self, dt_s: f64, measured: f64, expected: f64) -> Currents {
         self.measured.update(dt_s, measured);
         self.expected.update(dt_s, expected);
@@ -128,13 +128,13 @@ impl Block {
     }
 }
 
-/// One joint: what its currents are held against. What was learnt is of the robot, and stays for good.
+/// Collision threshold of one joint. The learnt bias belongs to the robot and survives resets.
 #[derive(Debug, Clone)]
 pub(super) struct Joint {
     tuning: Tuning,
     /// Learning and adaptation.
     pub bias: Bias,
-    /// The bias when nothing spoke for a collision last.
+    /// The bias at the last instant without signs of a collision.
     trusted: Bias,
 }
 
@@ -147,17 +147,17 @@ impl Joint {
         }
     }
 
-    /// What has been learnt up to here was no collision's.
+    /// Saves the bias: no collision has influenced it so far.
     pub fn trust_bias(&mut self) {
         self.trusted = self.bias;
     }
 
-    /// Forgets what was learnt since then.
+    /// Restores the saved bias.
     pub fn distrust_bias(&mut self) {
         self.bias = self.trusted;
     }
 
-    /// Holds what the currents do, `dt_s` seconds after the sample before, against the threshold.
+    /// Computes the threshold for the currents, `dt_s` seconds after the previous sample.
     pub fn read(&mut self, dt_s: f64, currents: &Currents) -> Reading {
         self.bias.advance(dt_s);
         let bias = self.bias.value(self.tuning.time_constant_s);
@@ -169,12 +169,12 @@ impl Joint {
         }
     }
 
-    /// The service Init of the learning machine.
+    /// Executes the service Init of the learning machine.
     pub fn init_bias(&mut self) {
         self.bias.init(self.tuning.time_constant_s);
     }
 
-    /// The bias estimation block, which runs beside the collision test.
+    /// Executes the bias estimation block, which runs in parallel with the collision test.
     pub fn estimate_bias(&mut self, reading: &Reading) {
         if reading.phase.is_tested() {
             self.bias.observe(
@@ -210,7 +210,7 @@ mod tests {
             Phase::Impulse,
         ] {
             assert!(reading(phase, 2.1).collides());
-            // Equation 3: a collision is what is above the threshold.
+            // Equation 3: a collision is strictly above the threshold.
             assert!(!reading(phase, 2.0).collides());
         }
     }

@@ -1,4 +1,4 @@
-//! What the adaptive sensor has learnt, to be kept from one run to the next.
+//! Learnt state of the adaptive sensor, kept between runs.
 
 use std::collections::BTreeMap;
 
@@ -6,16 +6,16 @@ use crate::frame::joints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the adaptive sensor has learnt of a robot and its cycle.
+/// Learnt state of the adaptive sensor for a robot and its cycle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Learnt {
-    /// By the joint's name.
+    /// Learnt state by joint name.
     pub joints: BTreeMap<String, LearntJoint>,
 }
 
 impl Learnt {
-    /// What is wrong with it for a robot with these joints, as a clause.
+    /// Returns the reason why the state does not fit a robot with these joints, as a clause.
     pub(super) fn fault(&self, joint_names: &[String]) -> Option<String> {
         let unsound = || {
             let mut joints = self.joints.iter();
@@ -27,21 +27,21 @@ impl Learnt {
     }
 }
 
-/// What it has learnt of one joint.
+/// Learnt state of one joint.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LearntJoint {
     /// The bias that would have avoided every virtual collision so far (`Coll_Ident`) \[effort unit\].
     pub ident: f64,
-    /// The bias from which the adaptation began last (`Coll_0`) \[effort unit\].
+    /// The bias from which the current adaptation started (`Coll_0`) \[effort unit\].
     pub start: f64,
-    /// How long it has been adapting since \[s\]; absent where nobody has asked for learning yet.
+    /// Time since the start of the current adaptation \[s\]; absent if learning has not been requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adapt_s: Option<f64>,
 }
 
 impl LearntJoint {
-    /// Whether the numbers can be what somebody learnt.
+    /// Returns whether all values are finite and not negative.
     fn is_sound(&self) -> bool {
         [self.ident, self.start, self.adapt_s.unwrap_or(0.0)]
             .iter()

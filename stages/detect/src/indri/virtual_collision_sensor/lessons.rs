@@ -1,4 +1,4 @@
-//! What contact-free recordings say of the bias.
+//! Learning of the bias from contact-free recordings.
 
 use tauscope_bus::flags;
 
@@ -8,18 +8,18 @@ use super::joint::{Joint, Tuning};
 use crate::frame::{LearnError, Lesson};
 use tauscope_dynamics::lowpass::Butterworth2;
 
-/// The first bias of a joint is this many times what contact-free data needed, for a motion that was
-/// not seen may be worse than all that were.
+/// Safety factor on the initial bias of a joint relative to the smallest one that fits contact-free data: an unseen
+/// motion may be worse than all seen ones.
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const SAFETY: f64 = 2.0;
-/// Nothing is learnt for so long after a contact \[ns\]: the arm swings out.
+/// Time after a contact without learning, while the arm's oscillation decays \[ns\].
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const AFTER_CONTACT_NS: i64 = 1_000_000_000;
-/// The shortest time that tells anything of a motion \[s\].
+/// Minimum duration of contact-free motion \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_S: f64 = 5.0;
 
-/// What a joint's bias would have had to be.
+/// Bias that a joint would have needed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Needed {
     /// `Coll_Ident` at the end \[effort unit\].
@@ -29,22 +29,22 @@ pub(super) struct Needed {
 }
 
 impl Needed {
-    /// `Coll_bias0`: twice the bias that would have avoided every virtual collision, and no less than
-    /// the mean residue.
+    /// Returns `Coll_bias0`: twice the bias that would have avoided every virtual collision, and at least the mean
+    /// residue.
     pub fn first_bias(&self) -> f64 {
         (SAFETY * self.ident).max(self.mean_residue)
     }
 }
 
-/// The paper's learning (equations 12 and 13) over the recordings, each joint's block beginning anew
-/// in each of them. What somebody labelled as a contact is left out.
+/// Runs the paper's learning (equations 12 and 13) over the recordings; each joint's block is reset at the start of
+/// each recording. Labelled contacts are excluded.
 pub(super) fn needed(
     detector: &'static str,
     tuning: Tuning,
     joint_count: usize,
     lessons: &[Lesson],
 ) -> Result<Vec<Needed>, LearnError> {
-    // No bias is large enough to keep a virtual collision from being believed.
+    // With an infinite applied bias, the collision test accepts every residue, so every virtual collision is learnt.
     let mut joints = vec![Joint::new(tuning, Bias::new(f64::INFINITY)); joint_count];
     let mut residues = vec![0.0; joint_count];
     let (mut seen, mut seen_s) = (0_u64, 0.0);
@@ -94,7 +94,7 @@ pub(super) fn needed(
     Ok(needed.collect())
 }
 
-/// Whether something touches the robot, or has just let go of it.
+/// Returns whether there is a labelled contact, or there was one less than `AFTER_CONTACT_NS` ago.
 fn is_touched(lesson: &Lesson, stamp_ns: i64) -> bool {
     let contacts = lesson.contacts.as_deref().unwrap_or(&[]);
     contacts.iter().any(|contact| {

@@ -1,10 +1,10 @@
-//! The estimate of the model error in absence of collisions (section 3.1): in the steady state
-//! equations 7 and 8, in the unsteady state equations 9 to 11.
+//! The estimate of the model error in the absence of collisions (section 3.1): equations 7 and 8 in the
+//! steady state, equations 9 to 11 in the unsteady state.
 
-/// Samples in the unsteady state's buffer.
+/// Number of samples in the unsteady state's buffer.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const BUFFER: usize = 100;
-/// The time that they span \[s\].
+/// Time span of the buffer \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const BUFFER_S: f64 = 1.0;
 
@@ -19,8 +19,8 @@ pub(super) struct ModelError {
 }
 
 impl ModelError {
-    /// With `period_s` between two updates in the steady state (the paper's `T_s`) and the weight
-    /// `delta` of equation 9.
+    /// Creates the estimate with `period_s` between two updates in the steady state (the paper's `T_s`) and the
+    /// weight `delta` of equation 9.
     pub fn new(period_s: f64, delta: f64) -> Self {
         Self {
             period_s,
@@ -31,14 +31,14 @@ impl ModelError {
         }
     }
 
-    /// Forgets every residue.
+    /// Discards all residues.
     pub fn reset(&mut self) {
         self.steady = None;
         self.unsteady = Unsteady::default();
         self.before = None;
     }
 
-    /// Takes the next |R|, `dt_s` seconds after the one before, and gives the model error.
+    /// Processes the next |R|, `dt_s` seconds after the previous one, and returns the model error.
     pub fn update(&mut self, dt_s: f64, residue: f64, is_steady: bool) -> f64 {
         let before = self.before.replace(residue).unwrap_or(residue);
         if is_steady {
@@ -52,16 +52,16 @@ impl ModelError {
     }
 }
 
-/// Equations 7 and 8, since the steady state began.
+/// Equations 7 and 8, from the start of the steady state.
 #[derive(Debug, Clone)]
 struct Steady {
     /// `err_ss`: the largest |R| so far.
     largest: f64,
-    /// `|R(t_ss)|` and the sum of `err_ss`, and how many summands that are.
+    /// Sum of `|R(t_ss)|` and all `err_ss`, and its number of summands.
     sum: f64,
     count: f64,
     since_update_s: f64,
-    /// The error as it was last sampled.
+    /// The last sampled error.
     sampled: f64,
 }
 
@@ -82,7 +82,7 @@ impl Steady {
         self.sum += self.largest;
         self.count += 1.0;
         self.since_update_s += dt_s;
-        // A period ends at the sample nearest to it, although its time is a sum of rounded steps.
+        // Half a step of tolerance: the period ends at the nearest sample in spite of rounding in the summed time.
         if self.since_update_s + 0.5 * dt_s > period_s {
             self.since_update_s = 0.0;
             self.sampled = self.sum / self.count;
@@ -91,15 +91,14 @@ impl Steady {
     }
 }
 
-/// Equations 9 to 11. The buffer goes on from one unsteady state to the next, the largest residue
-/// begins anew.
+/// Equations 9 to 11. The buffer persists from one unsteady state to the next; the largest residue is reset.
 #[derive(Debug, Clone)]
 struct Unsteady {
     /// `err_us`: the largest |R| since this unsteady state began.
     largest: f64,
-    /// Whether a steady state has come between.
+    /// Whether a steady state has occurred since the last update.
     left: bool,
-    /// `err_us` and the square of its distance from the mean at its time.
+    /// `err_us` and the square of its deviation from the mean at its time.
     buffer: [(f64, f64); BUFFER],
     filled: usize,
     next: usize,
@@ -142,7 +141,7 @@ impl Unsteady {
         delta * self.estimate + (1.0 - delta) * self.largest
     }
 
-    /// Puts `err_us` into the buffer and works out equations 11 and 10.
+    /// Adds `err_us` to the buffer and evaluates equations 11 and 10.
     fn sample(&mut self) {
         let (out, out_square) = self.buffer[self.next];
         self.filled = (self.filled + 1).min(BUFFER);
@@ -154,7 +153,7 @@ impl Unsteady {
         self.buffer[self.next] = (self.largest, square);
         self.next = (self.next + 1) % BUFFER;
         if self.next == 0 {
-            // What rounding left in the running sums goes.
+            // Removes the accumulated rounding errors from the running sums.
             self.sum = self.buffer.iter().map(|entry| entry.0).sum();
             self.squares = self.buffer.iter().map(|entry| entry.1).sum();
         }
@@ -175,13 +174,13 @@ mod tests {
         let mut error = ModelError::new(0.2, 0.5);
         // The last residue before the steady state is 4.
         error.update(0.1, 4.0, false);
-        // Until T_s has passed |R(t_ss)| stands.
+        // |R(t_ss)| is held until T_s has passed.
         close(error.update(0.1, 1.0, true), 4.0);
         // After 0.2 s: (4 + 1 + 3) / 3.
         close(error.update(0.1, 3.0, true), 8.0 / 3.0);
-        // Held for the next 0.2 s, whatever the residue does.
+        // Held for the next 0.2 s, independent of the residue.
         close(error.update(0.1, 9.0, true), 8.0 / 3.0);
-        // (4 + 1 + 3 + 9 + 9) / 5: the largest so far counts, not the residue itself.
+        // (4 + 1 + 3 + 9 + 9) / 5: the largest residue so far is used, not the residue itself.
         close(error.update(0.1, 2.0, true), 26.0 / 5.0);
     }
 
@@ -203,7 +202,7 @@ mod tests {
         for (delta, wanted) in [(0.0, 5.0), (1.0, 5.0 * 0.5 + 0.5 * 5.0)] {
             let mut error = ModelError::new(0.2, delta);
             error.update(0.01, 5.0, false);
-            // Both averages hold fives alone: err_us stays at its maximum.
+            // Both averages are over fives only: err_us stays at its maximum.
             close(error.update(0.01, 1.0, false), wanted);
         }
     }

@@ -1,49 +1,48 @@
-//! How much of the residue is measurement noise, whatever the model knows: the threshold stays so far above the model
-//! error that noise alone does not reach it in weeks.
+//! Estimate of the measurement noise in the residue, independent of the model. It gives the threshold a margin above
+//! the model error that noise alone does not reach within weeks.
 
 use tauscope_dynamics::lowpass::Butterworth2;
 
-/// Standard deviations that noise may make of a residue. What is Gaussian, behind a low-pass of 15 Hz, reaches
-/// more on top of what was learnt once in some thousand cycles.
+/// Margin for noise in the residue, in standard deviations. Gaussian noise after a low-pass of 15 Hz exceeds the
+/// margin on top of the learnt bias once in some thousand cycles.
 /// Statistical: about one in 150 000 samples.
 const SIGMAS: f64 = 4.5;
-/// Memory of the estimate \[s\].
+/// Time constant of the estimate \[s\].
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const MEMORY_S: f64 = 10.0;
-/// A second difference counts as no more than this many of its standard deviations: a collision is no noise.
+/// Limit at which second differences are clipped, in standard deviations: a collision is not noise.
 /// Statistical: Gaussian noise goes beyond three standard deviations once in 370 samples.
 const CLIP: f64 = 3.0;
-/// Samples that are gathered before the estimate is brought up to date; the first of them count in full, for there is
-/// nothing yet to hold them against.
+/// Samples between two updates of the estimate. The first block is not clipped, because there is no estimate yet.
 /// Tuned: for what it costs in time; not swept.
 const BLOCK: u32 = 16;
-/// The variance of a second difference of white noise is this many times that of the noise.
+/// Ratio of the variance of a second difference of white noise to that of the noise.
 /// Statistical: 1² + 2² + 1².
 const SECOND_DIFFERENCE: f64 = 6.0;
 
-/// The noise of one joint's currents, from second differences of what the model leaves: what is smooth, be it a
-/// constant, a ramp or a model error, leaves none.
+/// The noise of one joint's currents, from second differences of measured minus expected current. These vanish for
+/// smooth signals such as a constant, a ramp or a model error.
 #[derive(Debug, Clone)]
 pub(super) struct MeasurementNoise {
     /// The low-pass's noise bandwidth \[Hz\].
     bandwidth_hz: f64,
-    /// The two errors before, newest first.
+    /// The two previous errors, newest first.
     before: [f64; 2],
-    /// Of the block that is being gathered: squares of second differences, time \[s\], samples.
+    /// Current block: sum of squared second differences, duration \[s\], number of samples.
     sum: f64,
     block_s: f64,
     count: u32,
     /// Time since the start \[s\].
     elapsed_s: f64,
-    /// Mean square of second differences, and the largest that still counts in full.
+    /// Mean square of second differences, and the largest square that is not clipped.
     square: f64,
     most: f64,
-    /// [`SIGMAS`] standard deviations behind the low-pass \[effort unit\].
+    /// [`SIGMAS`] standard deviations of the noise after the low-pass \[effort unit\].
     margin: f64,
 }
 
 impl MeasurementNoise {
-    /// Behind a low-pass of this cutoff.
+    /// Creates the estimate for a low-pass with this cutoff.
     pub fn new(cutoff_hz: f64) -> Self {
         Self {
             bandwidth_hz: Butterworth2::NOISE_BANDWIDTH * cutoff_hz,
@@ -58,7 +57,7 @@ impl MeasurementNoise {
         }
     }
 
-    /// Starts anew at this difference of measured and expected current.
+    /// Resets the estimate to this difference of measured and expected current.
     pub fn reset(&mut self, error: f64) {
         self.before = [error; 2];
         (self.sum, self.block_s, self.count) = (0.0, 0.0, 0);
@@ -66,8 +65,8 @@ impl MeasurementNoise {
         self.most = f64::INFINITY;
     }
 
-    /// Takes the next difference of measured and expected current, `dt_s` after the one before, and gives what noise
-    /// may make of the residue \[effort unit\].
+    /// Processes the next difference of measured and expected current, `dt_s` after the previous one, and returns the
+    /// margin for noise in the residue \[effort unit\].
     #[inline]
     pub fn update(&mut self, dt_s: f64, error: f64) -> f64 {
         if dt_s <= 0.0 {
@@ -91,7 +90,7 @@ impl MeasurementNoise {
         let share = (self.block_s / self.elapsed_s.min(MEMORY_S)).min(1.0);
         self.square += share * (self.sum / count - self.square);
         self.most = CLIP * CLIP * self.square;
-        // Of white noise that much of the band up to half the rate passes.
+        // Share of the white noise's band, up to half the sample rate, that the low-pass transmits.
         let passes = (2.0 * self.bandwidth_hz * self.block_s / count).min(1.0);
         self.margin = SIGMAS * (self.square / SECOND_DIFFERENCE * passes).sqrt();
         (self.sum, self.block_s, self.count) = (0.0, 0.0, 0);
@@ -104,7 +103,7 @@ mod tests {
 
     const CUTOFF_HZ: f64 = 15.0;
 
-    /// Even noise of standard deviation 1.
+    /// Uniform noise of standard deviation 1.
     fn noise() -> impl FnMut() -> f64 {
         let mut state = 5_u64;
         move || {
@@ -126,7 +125,7 @@ mod tests {
         let (mut squares, count) = (0.0, 100_000);
         for k in 0..count {
             let x = noise();
-            // A ramp, and a jump as of a collision, are no noise.
+            // A ramp, and a jump as in a collision, are not noise.
             let jump = if k > 50_000 { 20.0 } else { 0.0 };
             margin = estimate.update(0.002, x + 0.01 * f64::from(k) + jump);
             squares += lowpass.update(0.002, x).powi(2);

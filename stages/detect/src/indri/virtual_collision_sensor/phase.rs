@@ -1,22 +1,22 @@
-//! The five-state machine of a joint (section 3.2, figure 6): which way measured and expected current
-//! are going, and so whether a collision is tested for.
+//! The five-state machine of a joint (section 3.2, figure 6): the trends of measured and expected current decide
+//! whether the collision test is made.
 
 use super::trend::{Band, NoiseBounds, Trend};
 
-/// The expected current is steady once both derivatives are below this share of their noise …
+/// Share of their noise below which both derivatives of the expected current must be for the steady state to begin.
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const STEADY_BELOW: f64 = 0.5;
-/// … and no longer steady above this one.
+/// Share of their noise up to which both derivatives may rise before the steady state ends.
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const STEADY_UNTIL: f64 = 1.0;
 
-/// What the currents of a joint are doing.
+/// State of the trends of a joint's currents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Phase {
     /// The expected current is almost constant.
     #[default]
     Steady,
-    /// Both vary, together: the one safe state, in which no collision is tested for.
+    /// Both vary together: the only safe state, without a collision test.
     Moving,
     /// The measured current has changed its trend, the expected one has not.
     Reversing,
@@ -27,23 +27,23 @@ pub enum Phase {
 }
 
 impl Phase {
-    /// Whether the collision test (equation 3) is made.
+    /// Returns whether the collision test (equation 3) is made.
     pub fn is_tested(self) -> bool {
         self != Self::Moving
     }
 }
 
-/// The machine, and the signs of the trends as they were last told apart.
+/// The state machine.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PhaseMachine {
     phase: Phase,
-    /// Rates of the measured and of the expected current at the sample before.
+    /// Rates of the measured and of the expected current at the previous sample.
     before: (f64, f64),
 }
 
 impl PhaseMachine {
-    /// The state after the sample that brought these trends. `omega_rad_s` is the low-pass's cutoff,
-    /// by which a rate's noise grows in one more derivative.
+    /// Returns the state after a sample with these trends. `omega_rad_s` is the low-pass's cutoff; the noise of the
+    /// second derivative is that of the rate times this frequency.
     pub fn update(
         &mut self,
         measured: &Trend,
@@ -80,14 +80,13 @@ impl PhaseMachine {
                 match self.phase {
                     _ if measured_turned => Phase::Reversing,
                     _ if expected_turned => Phase::ReversingDm,
-                    // Neither turned at this very sample: it is the one that did before.
+                    // Neither turned at this sample: the one that turned before still differs.
                     Phase::ReversingDm => Phase::ReversingDm,
                     _ => Phase::Reversing,
                 }
             }
             Band::Beyond if noise.is_over(measured) && noise.is_over(expected) => Phase::Moving,
-            // The paper names no transition here: the state stays, and from Steady the machine
-            // leaves for Moving.
+            // The paper defines no transition here: the state is kept, except that Steady changes to Moving.
             Band::Beyond => match self.phase {
                 Phase::Steady => Phase::Moving,
                 other => other,
@@ -132,7 +131,7 @@ mod tests {
             phases(&[(0.0, 0.0), (50.0, 0.1), (0.2, 0.9)]),
             [Phase::Steady; 3]
         );
-        // Once left, it is steady again only well below.
+        // Hysteresis: the steady state returns only well below the limit.
         let back = phases(&[(20.0, 20.0), (0.7, 0.7), (0.4, 0.4)]);
         assert_eq!(back, [Phase::Moving, Phase::Moving, Phase::Steady]);
     }

@@ -1,5 +1,4 @@
-//! The whole sensor: the joints' blocks one by one (section 5), the request for learning, and the
-//! alarm over all of them.
+//! The complete sensor: the blocks of all joints (section 5), the request for learning, and the common alarm.
 
 use tauscope_bus::{MAX_JOINTS, TwinState, flags};
 use tauscope_dynamics::lowpass::Butterworth2;
@@ -11,33 +10,33 @@ use super::learnt::Learnt;
 use super::validity::Validity;
 use crate::frame::{Detector, Judgement, Seen, Shared, State, Tap, Verdict};
 
-/// A ratio from here on may already belong to a collision: where the search for its beginning stops.
+/// Ratio from which a sample may already belong to a collision: the search for the collision's start stops below it.
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const LOW_RATIO: f64 = 0.5;
 
-/// For so long after an alarm nothing is learnt: the model error still remembers it \[ns\].
+/// Time after an alarm without learning, because the model error still contains the collision \[ns\].
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const AFTER_ALARM_NS: i64 = 2_000_000_000;
 
-/// What the sensor says while nothing is the matter.
+/// State without an alarm.
 const FREE: &str = "free";
-/// What it says while it learns and nothing is the matter.
+/// State without an alarm during learning.
 const LEARNING: &str = "learning";
-/// A collision.
+/// State during a collision.
 const COLLISION: &str = "collision";
-/// An alarm that is no collision: the expected current does not belong to this robot as it is now.
+/// State during an alarm that is not a collision: the expected current does not fit the robot's current condition.
 const MODEL_ERROR: &str = "model_error";
 
-/// How the adaptive version learns; the basic one does not.
+/// Learning settings of the adaptive version; the basic one does not learn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Learning {
-    /// How long learning takes \[s\].
+    /// Duration of learning \[s\].
     pub duration_s: f64,
-    /// Whether it is asked for as the first sample comes.
+    /// Whether learning starts at the first sample.
     pub at_start: bool,
 }
 
-/// An alarm that lasts.
+/// A current alarm.
 #[derive(Debug, Clone, Copy)]
 struct Alarm {
     state: &'static str,
@@ -49,7 +48,7 @@ struct Alarm {
 /// The sensor.
 pub(crate) struct Sensor {
     name: &'static str,
-    /// Names for what was learnt; empty where nothing is.
+    /// Joint names in the learnt state; empty if the sensor does not learn.
     joint_names: Vec<String>,
     blocks: Tap<Blocks>,
     joints: Vec<Joint>,
@@ -59,7 +58,7 @@ pub(crate) struct Sensor {
     asked: bool,
     settling_s: f64,
     hold_ns: i64,
-    /// Newest stamp, and how long ago everything began anew.
+    /// Newest stamp, and time since the last reset.
     newest_ns: Option<i64>,
     elapsed_s: f64,
     newest_low_ns: Option<i64>,
@@ -67,21 +66,22 @@ pub(crate) struct Sensor {
     newest_alarm_ns: Option<i64>,
 }
 
-/// What all joints say of a sample.
+/// Results of all joints for a sample.
 #[derive(Default)]
 struct Readings {
-    /// The largest ratio of residue and threshold, of all joints and of those that are tested.
+    /// Largest ratio of residue to threshold: over all joints (`ratio`) and over the tested ones (`score`).
     ratio: f64,
     score: f64,
-    /// Joints that see a collision, and whose model is wrong: bit j for joint j.
+    /// Joints with a collision, and joints with a wrong model: bit j for joint j.
     colliding: u32,
     wrong: u32,
-    /// Whether the model of one may be wrong.
+    /// Whether the model of any joint may be wrong.
     doubtful: bool,
 }
 
 impl Sensor {
-    /// A sensor with the first bias of each joint; it learns nothing. What the currents do it may have `shared`.
+    /// Creates a sensor with the initial bias `first` of each joint; it does not learn. Sensors may share the
+    /// evaluation of the currents through `shared`.
     pub(crate) fn new(
         name: &'static str,
         tuning: Tuning,
@@ -117,7 +117,7 @@ impl Sensor {
         }
     }
 
-    /// Lets it learn, from what an earlier life has `learnt` of these joints on.
+    /// Enables learning, starting from the state `learnt` in an earlier run.
     pub(crate) fn let_learn(
         &mut self,
         learning: Learning,
@@ -134,7 +134,7 @@ impl Sensor {
         }
     }
 
-    /// Clears what belongs to the signals; what was learnt stays.
+    /// Clears the state of the signals; the learnt state is kept.
     fn reset(&mut self) {
         for validity in &mut self.validity {
             validity.reset();
@@ -145,7 +145,8 @@ impl Sensor {
         self.newest_alarm_ns = None;
     }
 
-    /// Reads every joint. Where the sensor is ready, its model is judged, and its bias learnt if what it does is `usual`.
+    /// Evaluates every joint. `usual` is `None` while the sensor is not ready; otherwise the joints' models are
+    /// checked. If `usual` is true, the biases are estimated, too.
     fn read(
         &mut self,
         dt_s: f64,
@@ -175,7 +176,7 @@ impl Sensor {
         all
     }
 
-    /// The step of the learning machine.
+    /// Advances the learning machine.
     fn learn(&mut self, dt_s: f64) {
         let Some(learning) = self.learning else {
             return;
@@ -192,8 +193,8 @@ impl Sensor {
         }
     }
 
-    /// The alarm after the sample at `stamp_ns`, on which the joints `colliding` detected, the model
-    /// does not hold for the joints `wrong`, and is doubtful for any.
+    /// Updates the alarm with the sample at `stamp_ns`: the joints `colliding` detect a collision, the model is wrong
+    /// for the joints `wrong`, and `doubtful` for any joint.
     fn alarm(
         &mut self,
         stamp_ns: i64,
@@ -202,7 +203,7 @@ impl Sensor {
         doubtful: bool,
     ) -> Option<Alarm> {
         let (state, joints) = match self.alarm {
-            // A collision stays one until it is over.
+            // A collision keeps its kind until it ends.
             Some(alarm) if alarm.state == COLLISION && colliding != 0 => (COLLISION, colliding),
             _ if wrong != 0 => (MODEL_ERROR, wrong | colliding),
             _ if doubtful && colliding != 0 => (MODEL_ERROR, colliding),
@@ -249,7 +250,8 @@ impl Detector for Sensor {
     fn judge(&mut self, sample: &TwinState) -> Judgement {
         let stamp_ns = sample.header.stamp_ns;
         let step = self.blocks.with(|blocks| *blocks.update(sample));
-        // What others have asked for at the same stamp is no step of this one's time.
+        // The shared blocks may already have processed this sample for another sensor: a repeated stamp is no time
+        // step.
         let is_new = self.newest_ns.replace(stamp_ns) != Some(stamp_ns);
         let dt_s = if is_new { step.dt_s } else { 0.0 };
         if step.anew && is_new {
@@ -260,13 +262,13 @@ impl Detector for Sensor {
             self.asked = true;
         }
         self.elapsed_s += dt_s;
-        // Remark 2: at first filters and averages say nothing.
+        // Remark 2: filters and averages are invalid at first.
         let ready = self.elapsed_s >= self.settling_s && sample.header.has(flags::READY);
         if ready {
             self.learn(dt_s);
         }
 
-        // An alarm is no usual behaviour, nor what the arm does right after it.
+        // Nothing is learnt during an alarm and shortly after it.
         let usual = self
             .newest_alarm_ns
             .is_none_or(|newest| stamp_ns - newest > AFTER_ALARM_NS);
@@ -290,7 +292,7 @@ impl Detector for Sensor {
         }
         if alarm.is_some() {
             self.newest_alarm_ns = Some(stamp_ns);
-            // Nor is the way up to it: else every collision would make the next one harder to see.
+            // Nor from the rise before the alarm: otherwise every collision would make the next one harder to detect.
             if self.state == LearningState::Idle {
                 for joint in &mut self.joints {
                     joint.distrust_bias();

@@ -6,17 +6,17 @@ use tauscope_dynamics::lowpass::Butterworth2;
 /// Half width of the noise bounds, in standard deviations of the derivatives' error.
 /// Statistical: Gaussian noise goes beyond three standard deviations once in 370 samples.
 const BOUND_SIGMAS: f64 = 3.0;
-/// Half width of the "further much higher bound", in the same.
+/// Half width of the paper's "further much higher bound", in the same standard deviations.
 /// Tuned: twice the bound, by hand; not swept.
 const IMPULSE_SIGMAS: f64 = 6.0;
 /// Memory of the noise statistics \[s\].
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const NOISE_MEMORY_S: f64 = 2.0;
-/// Until then every error counts in full, for there are no bounds yet to hold it against \[s\].
+/// Time during which errors are not clipped, because there are no bounds yet \[s\].
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const NOISE_SETTLING_S: f64 = 0.2;
 
-/// A current through the low-pass, and how it changes.
+/// A low-passed current and its derivatives.
 #[derive(Debug, Clone)]
 pub(super) struct Trend {
     lowpass: Butterworth2,
@@ -40,13 +40,13 @@ impl Trend {
         }
     }
 
-    /// Starts anew, settled at `x`.
+    /// Resets the trend to the steady state at `x`.
     pub fn reset(&mut self, x: f64) {
         self.lowpass.reset(x);
         (self.value, self.rate, self.curvature) = (x, 0.0, 0.0);
     }
 
-    /// Takes the current `x`, `dt_s` seconds after the one before.
+    /// Processes the current `x`, `dt_s` seconds after the previous one.
     pub fn update(&mut self, dt_s: f64, x: f64) {
         self.value = self.lowpass.update(dt_s, x);
         self.rate = self.lowpass.rate();
@@ -57,12 +57,12 @@ impl Trend {
     }
 }
 
-/// Where an error between the derivatives of measured and expected current lies.
+/// Range of an error between the derivatives of measured and expected current.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Band {
     /// Within the noise bounds.
     Noise,
-    /// Beyond them.
+    /// Beyond the noise bounds.
     Beyond,
     /// Beyond the higher bounds.
     Impulse,
@@ -73,24 +73,24 @@ pub(super) enum Band {
 pub(super) struct NoiseBounds {
     mean: f64,
     variance: f64,
-    /// Its root.
+    /// Square root of `variance`.
     sigma: f64,
     elapsed_s: f64,
 }
 
 impl NoiseBounds {
-    /// Standard deviation of the error \[effort unit/s\].
+    /// Returns the standard deviation of the error \[effort unit/s\].
     pub fn sigma(&self) -> f64 {
         self.sigma
     }
 
-    /// `Th_min` and `Th_max` \[effort unit/s\].
+    /// Returns `Th_min` and `Th_max` \[effort unit/s\].
     pub fn bounds(&self) -> (f64, f64) {
         let half = BOUND_SIGMAS * self.sigma();
         (self.mean - half, self.mean + half)
     }
 
-    /// Where `error` lies.
+    /// Returns the range of `error`.
     pub fn band(&self, error: f64) -> Band {
         let off = (error - self.mean).abs();
         if off <= BOUND_SIGMAS * self.sigma() {
@@ -102,14 +102,14 @@ impl NoiseBounds {
         }
     }
 
-    /// Whether a derivative lies outside `Th_min` and `Th_max`.
+    /// Returns whether a derivative is outside `Th_min` and `Th_max`.
     pub fn is_over(&self, rate: f64) -> bool {
         let (low, high) = self.bounds();
         !(low..=high).contains(&rate)
     }
 
-    /// Takes the next error. One beyond the bounds counts as one at the bounds: a collision widens
-    /// them little, and noise that grew widens them in time.
+    /// Processes the next error, clipped to the bounds: a collision widens them only slightly, whereas increased
+    /// noise widens them over time.
     pub fn update(&mut self, dt_s: f64, error: f64) {
         if dt_s <= 0.0 {
             return;

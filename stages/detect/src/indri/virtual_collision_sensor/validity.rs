@@ -1,26 +1,26 @@
-//! Whether the model behind the expected current holds at all (remark 1).
+//! Checks whether the model behind the expected current is valid at all (remark 1).
 //!
-//! A collision comes suddenly and is soon over. Where a joint's residue has been far beyond the
-//! smallest collision effort for most of the time, it is the model that is wrong: a payload that was
-//! declared wrongly, or a work-piece that stayed in the gripper.
+//! A collision is sudden and short. If a joint's residue has been far above the smallest collision
+//! effort for most of the time, the model is wrong: a payload was declared wrongly, or a work-piece
+//! stayed in the gripper.
 
-/// Far beyond: this many times the smallest collision effort.
+/// Limit of the residue, as a multiple of the smallest collision effort.
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const FAR: f64 = 2.0;
-/// The share of the time from which on a model is wrong.
+/// Share of the time beyond the limit above which the model becomes wrong.
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const WRONG_FROM: f64 = 0.5;
-/// And down to which it stays so.
+/// Share of the time beyond the limit down to which a wrong model stays wrong.
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const WRONG_UNTIL: f64 = 0.25;
-/// Memory of the share \[s\].
+/// Time constant of the share \[s\].
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const MEMORY_S: f64 = 10.0;
-/// What it takes at least to say so where there is no other alarm \[s\].
+/// Minimum duration of evidence before a wrong model raises an alarm by itself \[s\].
 /// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const CERTAIN_S: f64 = 3.0;
 
-/// The share of the time that a joint's residue has been far beyond the smallest collision effort.
+/// The share of the time in which a joint's residue was far above the smallest collision effort.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Validity {
     limit: f64,
@@ -30,7 +30,7 @@ pub(super) struct Validity {
 }
 
 impl Validity {
-    /// With the first bias of the joint, the smallest effort that is a collision \[effort unit\].
+    /// Creates the check with the joint's initial bias, the smallest effort treated as a collision \[effort unit\].
     pub fn new(bias: f64) -> Self {
         Self {
             limit: FAR * bias,
@@ -40,12 +40,12 @@ impl Validity {
         }
     }
 
-    /// Forgets what was.
+    /// Discards the history.
     pub fn reset(&mut self) {
         (self.share, self.elapsed_s, self.wrong) = (0.0, 0.0, false);
     }
 
-    /// Takes the next |R|, `dt_s` seconds after the one before.
+    /// Processes the next |R|, `dt_s` seconds after the previous one.
     pub fn update(&mut self, dt_s: f64, residue: f64) {
         let beyond = f64::from(u8::from(residue > self.limit));
         if self.elapsed_s == 0.0 {
@@ -60,12 +60,12 @@ impl Validity {
         self.wrong = self.share > from;
     }
 
-    /// Whether the model is wrong as far as one knows: an alarm now is no collision.
+    /// Returns whether the model is probably wrong, so that an alarm is not a collision.
     pub fn is_doubtful(&self) -> bool {
         self.wrong
     }
 
-    /// Whether that has lasted long enough to be an alarm of its own.
+    /// Returns whether the model has been wrong for long enough to raise an alarm by itself.
     pub fn is_wrong(&self) -> bool {
         self.wrong && self.elapsed_s >= CERTAIN_S
     }
@@ -75,7 +75,7 @@ impl Validity {
 mod tests {
     use super::*;
 
-    /// After `seconds` each of these residues, bias 1.
+    /// Returns the check after these spans of (duration \[s\], residue), with bias 1.
     fn after(spans: &[(f64, f64)]) -> Validity {
         let mut validity = Validity::new(1.0);
         for &(seconds, residue) in spans {
@@ -98,7 +98,7 @@ mod tests {
     fn a_collision_is_too_short_and_a_payload_is_not() {
         assert!(!after(&[(20.0, 0.1), (2.0, 30.0)]).is_doubtful());
         assert!(after(&[(20.0, 0.1), (10.0, 2.1)]).is_wrong());
-        // Put down again, it is forgotten.
+        // After the payload is put down again, the model is valid again.
         assert!(!after(&[(20.0, 0.1), (10.0, 2.1), (20.0, 0.1)]).is_doubtful());
     }
 }

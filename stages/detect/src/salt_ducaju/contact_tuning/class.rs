@@ -2,12 +2,12 @@
 
 use crate::frame::{ClassSweep, ContactKind};
 
-/// How far above the largest ratio the last bound of a sweep lies, as a share of it.
+/// Distance of a sweep's last bound above the largest ratio, as a share of that ratio.
 /// Tuned: for the picture alone.
 const ABOVE: f64 = 0.1;
 
-/// Sensitivity and specificity of every bound that parts the `ratios` of collisions (below) and
-/// cooperations otherwise than the one before; the last is above all that are finite, and at least
+/// Returns sensitivity and specificity of every bound that divides the `ratios` differently from the previous bound.
+/// Ratios below a bound are classified as collisions. The last bound is above all finite ratios, and at least
 /// `at_least`.
 pub(crate) fn sweep_class(ratios: &[(ContactKind, f64)], at_least: f64) -> Vec<ClassSweep> {
     let finite = ratios
@@ -38,8 +38,8 @@ pub(crate) fn sweep_class(ratios: &[(ContactKind, f64)], at_least: f64) -> Vec<C
     sweep.collect()
 }
 
-/// The bounds, from the first to the last, with the largest 2 specificity + sensitivity: a collision taken for
-/// a cooperation does more harm than the reverse. Those between two contacts are equal.
+/// Returns the range of bounds with the largest 2 specificity + sensitivity: a collision classified as a cooperation
+/// does more harm than the reverse. All bounds between two neighbouring ratios are equivalent.
 pub(crate) fn best(sweep: &[ClassSweep]) -> [f64; 2] {
     let worth = |at: &ClassSweep| 2.0 * at.specificity + at.sensitivity;
     let most = (0..sweep.len()).max_by(|&a, &b| worth(&sweep[a]).total_cmp(&worth(&sweep[b])));

@@ -1,5 +1,5 @@
-//! The autoencoder: dense layers that narrow and widen again, `ReLU` behind each middle layer, the
-//! output as it is. It learns to give back its input; what it cannot give back is unlike its training.
+//! The autoencoder: dense layers with a bottleneck, `ReLU` after each hidden layer, a linear output. It
+//! learns to reconstruct its input; an input with a large reconstruction error is unlike its training data.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +14,7 @@ use crate::frame::{LearnError, SignalSettings, Task, Trained, TrainedError};
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Autoencoder {
     layers: Vec<Dense>,
-    /// Units of the layer that is computed and of the one before.
+    /// Units of the current layer and of the previous one.
     units: [Vec<f32>; 2],
 }
 
@@ -22,13 +22,14 @@ pub(crate) struct Autoencoder {
 #[derive(Debug, Clone, PartialEq)]
 struct Dense {
     inputs: usize,
-    /// A row an output.
+    /// Weights W, one row per output.
     weight: Vec<f32>,
     bias: Vec<f32>,
 }
 
 impl Autoencoder {
-    /// The detector `name` over windows of so many samples, one every so many, with so many units in the middle layers.
+    /// Trains the detector `name` on windows of `window` samples, one every `stride` samples, with hidden layers of
+    /// `layers` units.
     ///
     /// # Errors
     /// If a setting is out of range, there is no robot's model, too little data, or the training diverges.
@@ -50,7 +51,7 @@ impl Autoencoder {
         course.end(|trained| vectors.save(&net, trained), Self::scorer)
     }
 
-    /// What scores, from a trained detector.
+    /// Returns the scorer of a trained detector.
     ///
     /// # Errors
     /// As [`load`](Self::load).
@@ -58,7 +59,7 @@ impl Autoencoder {
         Ok(Box::new(VectorScorer::load(trained, Self::load)?))
     }
 
-    /// Trains with middle layers of `middle` units.
+    /// Trains with hidden layers of `middle` units.
     pub fn fit(
         vectors: &Vectors,
         middle: &[usize],
@@ -78,7 +79,7 @@ impl Autoencoder {
         Self::of(&net)
     }
 
-    /// What was trained.
+    /// Returns the autoencoder with the trained weights.
     fn of(net: &DenseNet<f32>) -> Self {
         let layers = net.numbers().map(|[weight, bias]| Dense {
             inputs: weight.len() / bias.len(),
@@ -95,10 +96,10 @@ impl Autoencoder {
         }
     }
 
-    /// What [`VectorModel::save`] kept.
+    /// Loads an autoencoder that [`VectorModel::save`] saved.
     ///
     /// # Errors
-    /// If an array is not there or has another shape.
+    /// If an array is missing or has another shape.
     pub fn load(dimensions: usize, from: &Trained) -> Result<Self, TrainedError> {
         let middle: Vec<usize> = (1..)
             .map_while(|layer| {
@@ -121,7 +122,7 @@ impl Autoencoder {
 }
 
 impl VectorModel for Autoencoder {
-    /// Mean square of what it does not give back.
+    /// Returns the mean squared reconstruction error.
     fn score(&mut self, x: &[f64]) -> f64 {
         let [now, before] = &mut self.units;
         now.clear();
@@ -150,7 +151,7 @@ impl VectorModel for Autoencoder {
     }
 }
 
-/// The layers' sizes from input to output.
+/// Returns the layers' sizes from input to output.
 fn sizes(dimensions: usize, middle: &[usize]) -> Vec<usize> {
     let ends = std::iter::once(&dimensions);
     ends.clone().chain(middle).chain(ends).copied().collect()

@@ -1,4 +1,4 @@
-//! The recurrent net of `lstm_momentum_observer`: one LSTM layer and a dense one behind it, which
+//! The recurrent network of `lstm_momentum_observer`: an LSTM layer followed by a dense layer, which
 //! estimate the external torque of a contact-free arm from its motion.
 
 use rand::SeedableRng;
@@ -11,10 +11,10 @@ use super::training::{Recurrent, Sequence, fit};
 use super::{TrainingSettings, demand};
 use crate::frame::{LearnError, SignalSettings, Task, Trained, TrainedError};
 
-/// Input numbers a joint: q(t), q̇(t), q̇(t-1).
+/// Number of inputs per joint: q(t), q̇(t), q̇(t-1).
 const INPUTS: usize = 3;
 
-/// A trained net. Gates in the order input, forget, cell, output.
+/// A trained network, with gates in the order input, forget, cell, output.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Lstm {
     joints: usize,
@@ -34,7 +34,7 @@ pub(crate) struct Lstm {
 }
 
 impl Lstm {
-    /// The detector `name` with so many hidden units, on sequences of so many samples.
+    /// Trains the detector `name` with `hidden` units, on sequences of `length` samples.
     ///
     /// # Errors
     /// If a setting is out of range, there is no robot's model, too little data, or the training diverges.
@@ -53,10 +53,10 @@ impl Lstm {
         course.end(|trained| net.save(trained), Self::scorer)
     }
 
-    /// What scores, from a trained detector.
+    /// Returns the scorer of a trained detector.
     ///
     /// # Errors
-    /// If an array is not there or has another shape.
+    /// If an array is missing or has another shape.
     pub fn scorer(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
         Ok(Box::new(LstmScorer::load(trained)?))
     }
@@ -91,7 +91,7 @@ impl Lstm {
             net.learn(&sequences, batch, rng);
         };
         let settings = TrainingSettings {
-            // A batch is counted in samples.
+            // The setting is in samples, `fit` needs sequences.
             batch: (settings.batch / length).max(1),
             ..*settings
         };
@@ -99,7 +99,7 @@ impl Lstm {
         Self::of(&net, [input_scaling, output_scaling])
     }
 
-    /// What was trained, with the scaling of its inputs and outputs.
+    /// Returns the network with the trained weights and the scaling of its inputs and outputs.
     fn of(net: &Recurrent<f32>, [input_scaling, output_scaling]: [Scaling; 2]) -> Self {
         let numbers = net.numbers().map(<[f32]>::to_vec);
         let [
@@ -122,7 +122,7 @@ impl Lstm {
         }
     }
 
-    /// Keeps scaling and weights.
+    /// Saves scaling and weights.
     pub fn save(&self, into: &mut Trained) {
         let (joints, hidden) = (self.joints, self.hidden);
         self.input_scaling.save("input", into);
@@ -142,10 +142,10 @@ impl Lstm {
         into.put_f32("output.bias", &[joints], &self.bias_output);
     }
 
-    /// What [`Lstm::save`] kept.
+    /// Loads a network that [`Lstm::save`] saved.
     ///
     /// # Errors
-    /// If an array is not there or has another shape.
+    /// If an array is missing or has another shape.
     pub fn load(from: &Trained) -> Result<Self, TrainedError> {
         let joints = from.facts().joints.len();
         let hidden = from.shape("output.weight").get(1).copied().unwrap_or(0);
@@ -163,7 +163,7 @@ impl Lstm {
         })
     }
 
-    /// One sample: `hidden` and `cell` go on, `gates` is scratch.
+    /// Advances the state `hidden` and `cell` by one sample; `gates` is workspace.
     fn step(&self, input: &[f64], hidden: &mut [f32], cell: &mut [f32], gates: &mut [f32]) {
         gates.copy_from_slice(&self.bias);
         let mut add = |value: f32, row: &[f32]| {
@@ -186,7 +186,7 @@ impl Lstm {
         }
     }
 
-    /// Scaled output of joint `joint`.
+    /// Returns the scaled output of joint `joint`.
     fn output(&self, joint: usize, hidden: &[f32]) -> f32 {
         let row = &self.weight_output[joint * self.hidden..][..self.hidden];
         let sum: f32 = row.iter().zip(hidden).map(|(w, h)| w * h).sum();
@@ -194,7 +194,7 @@ impl Lstm {
     }
 }
 
-/// q(t), q̇(t), q̇(t-1) of all joints.
+/// Returns q(t), q̇(t), q̇(t-1) of all joints.
 fn input(signal: &Signal, joints: usize) -> impl Iterator<Item = f64> + '_ {
     let parts = [
         &signal.position,
@@ -228,10 +228,10 @@ fn sequence(
     sequence
 }
 
-/// Holds the net's estimate against the observer's, with the net's state carried from sample to sample.
+/// Compares the network's estimate with the observer's; the network's state persists from sample to sample.
 pub(crate) struct LstmScorer {
     net: Lstm,
-    /// Samples until the net has seen as many as in training.
+    /// Number of samples in a training sequence: there is no score before as many samples.
     window: usize,
     seen: usize,
     input: Vec<f64>,
@@ -241,10 +241,10 @@ pub(crate) struct LstmScorer {
 }
 
 impl LstmScorer {
-    /// What [`Lstm::save`] kept.
+    /// Loads a network that [`Lstm::save`] saved.
     ///
     /// # Errors
-    /// If an array is not there or has another shape.
+    /// If an array is missing or has another shape.
     pub fn load(from: &Trained) -> Result<Self, TrainedError> {
         Ok(Self::new(Lstm::load(from)?, from.facts().window))
     }
@@ -263,7 +263,7 @@ impl LstmScorer {
 }
 
 impl Scorer for LstmScorer {
-    /// `|τ_ext - τ̂_ext|²` \[(N m)²\].
+    /// Returns `|τ_ext - τ̂_ext|²` \[(N m)²\].
     fn score(&mut self, signal: &Signal) -> Option<f64> {
         self.input.clear();
         self.input.extend(input(signal, self.net.joints));

@@ -1,5 +1,5 @@
 //! The one-class support vector machine (Schölkopf et al. 2001) with the kernel
-//! k(x, y) = exp(-γ |x - y|²), trained by libsvm-rs, which solves as LIBSVM and scikit-learn do.
+//! k(x, y) = exp(-γ |x - y|²), trained by libsvm-rs, which uses the solver of LIBSVM and scikit-learn.
 
 use libsvm_rs::train::svm_train;
 use libsvm_rs::{KernelType, SvmNode, SvmParameter, SvmProblem, SvmType};
@@ -9,10 +9,10 @@ use super::runner::{Course, Scorer};
 use super::vectors::{VectorModel, VectorScorer, Vectors};
 use crate::frame::{LearnError, SignalSettings, Task, Trained, TrainedError};
 
-/// Memory for kernel values while training \[MB\].
+/// Cache for kernel values in training \[MB\].
 /// Tuned: for what it costs in time; not swept.
 const CACHE_MB: f64 = 400.0;
-/// LIBSVM's and scikit-learn's tolerance of the optimum.
+/// Tolerance of the optimum, as in LIBSVM and scikit-learn.
 /// Tuned: by the authors of LIBSVM.
 const TOLERANCE: f64 = 1e-3;
 
@@ -22,15 +22,15 @@ pub(crate) struct OneClass {
     dimensions: usize,
     gamma: f64,
     rho: f64,
-    /// One weight a support vector.
+    /// One weight per support vector.
     alpha: Vec<f64>,
-    /// The support vectors, one after the other.
+    /// The support vectors, concatenated.
     vectors: Vec<f64>,
 }
 
 impl OneClass {
-    /// Trains on `rows` of `dimensions` scaled numbers each. ν bounds the share of training data left
-    /// outside. γ = 1 / (dimensions · variance), scikit-learn's `scale`, as the paper names none.
+    /// Trains on `rows` of `dimensions` scaled numbers each. ν bounds the share of training data outside the
+    /// boundary. γ = 1 / (dimensions · variance), scikit-learn's `scale`, because the paper does not state it.
     pub fn fit(rows: &[f64], dimensions: usize, nu: f64) -> Self {
         let count = rows.len() as f64;
         let mean = rows.iter().sum::<f64>() / count;
@@ -72,7 +72,8 @@ impl OneClass {
         }
     }
 
-    /// The detector `name` over windows of so many samples, one every so many; nothing in its training is random.
+    /// Trains the detector `name` on windows of `window` samples, one every `stride` samples; the training is
+    /// deterministic.
     ///
     /// # Errors
     /// If a setting is out of range, there is no robot's model, or too little data.
@@ -92,7 +93,7 @@ impl OneClass {
         course.end(|trained| vectors.save(&machine, trained), Self::scorer)
     }
 
-    /// What scores, from a trained detector.
+    /// Returns the scorer of a trained detector.
     ///
     /// # Errors
     /// As [`load`](Self::load).
@@ -100,15 +101,15 @@ impl OneClass {
         Ok(Box::new(VectorScorer::load(trained, Self::load)?))
     }
 
-    /// ρ, which no score exceeds.
+    /// Returns ρ, the upper bound of the score.
     pub fn largest_score(trained: &Trained) -> Option<f64> {
         Some(trained.get_f64("svm.rho", &[1]).ok()?[0])
     }
 
-    /// What [`VectorModel::save`] kept.
+    /// Loads a machine that [`VectorModel::save`] saved.
     ///
     /// # Errors
-    /// If an array is not there or has another shape.
+    /// If an array is missing or has another shape.
     pub fn load(dimensions: usize, from: &Trained) -> Result<Self, TrainedError> {
         let count = from.shape("svm.alpha").first().copied().unwrap_or(0);
         Ok(Self {
@@ -122,7 +123,7 @@ impl OneClass {
 }
 
 impl VectorModel for OneClass {
-    /// `ρ - Σ α_i k(x_i, x)`: positive outside of the boundary.
+    /// Returns `ρ - Σ α_i k(x_i, x)`: positive outside the boundary.
     fn score(&mut self, x: &[f64]) -> f64 {
         let vectors = self.vectors.chunks_exact(self.dimensions);
         let inside: f64 = (self.alpha.iter().zip(vectors))

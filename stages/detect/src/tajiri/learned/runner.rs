@@ -1,4 +1,4 @@
-//! How a learned detector is trained and run, whatever it learns.
+//! Training and inference common to all learned detectors.
 
 use std::sync::Arc;
 
@@ -12,22 +12,22 @@ use crate::frame::{
     Task, Trained, TrainedError,
 };
 
-/// What a detector makes of the signals, sample by sample.
+/// Scores the signals, sample by sample.
 pub(crate) trait Scorer: Send {
-    /// The score at the next sample, once there have been enough of them.
+    /// Returns the score at the next sample, once there are enough samples.
     fn score(&mut self, signal: &Signal) -> Option<f64>;
 
-    /// Forgets all samples.
+    /// Discards all samples.
     fn reset(&mut self);
 }
 
 /// Reads a scorer from a trained detector.
 pub(crate) type Load = fn(&Trained) -> Result<Box<dyn Scorer>, TrainedError>;
 
-/// The detector `name`, as `setup` has it trained.
+/// Builds the detector `name` from its trained state in `setup`.
 ///
 /// # Errors
-/// If it is not there, is another detector, was trained for other joints, or lacks an array.
+/// If the trained state is missing, belongs to another detector or to other joints, or lacks an array.
 pub(crate) fn build(
     name: &'static str,
     setup: &Setup,
@@ -102,7 +102,7 @@ impl Detector for Learned {
         if reset {
             self.scorer.reset();
         } else if sample.header.stamp_ns == self.stamp_ns {
-            // A repeated stamp is no new sample to windows and recurrent nets.
+            // A repeated stamp must not enter windows and recurrent networks again.
             return self.judgement;
         }
         self.stamp_ns = sample.header.stamp_ns;
@@ -117,7 +117,7 @@ impl Detector for Learned {
     }
 }
 
-/// One training.
+/// One training run.
 pub(crate) struct Course<'a> {
     name: &'static str,
     settings: SignalSettings,
@@ -128,11 +128,11 @@ pub(crate) struct Course<'a> {
 }
 
 impl<'a> Course<'a> {
-    /// The training data of the detector `name`, whose scores rest on `window` samples: what is free
-    /// of contacts in the training recordings.
+    /// Collects the training data of the detector `name`, whose scores use `window` samples: the contact-free part of
+    /// the training recordings.
     ///
     /// # Errors
-    /// If there is no robot's model, or not one window of data.
+    /// If there is no robot model, or less than one window of data.
     pub fn new(
         name: &'static str,
         settings: &SignalSettings,
@@ -169,17 +169,17 @@ impl<'a> Course<'a> {
         })
     }
 
-    /// Contact-free stretches of signals, each at least a window long.
+    /// Returns the contact-free segments of the signals, each at least a window long.
     pub fn stretches(&self) -> &[Vec<Signal>] {
         &self.stretches
     }
 
-    /// Joints of the robot.
+    /// Returns the number of joints of the robot.
     pub fn joint_count(&self) -> usize {
         self.joints.len()
     }
 
-    /// An error of the training.
+    /// Returns a training error.
     pub fn failed(&self, error: impl std::fmt::Display) -> LearnError {
         LearnError::Failed {
             detector: self.name,
@@ -187,11 +187,11 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// The trained detector, its arrays filled in by `save`, its score measured on the contact-free
-    /// part of the validation recordings (the training recordings if there are none).
+    /// Returns the trained detector. `save` fills in its arrays; its score is measured on the contact-free part of
+    /// the validation recordings (of the training recordings if there are none).
     ///
     /// # Errors
-    /// If the training gave numbers that are not finite, or nothing can be measured.
+    /// If the training gave non-finite numbers, or there is no data to measure the score.
     pub fn end(self, save: impl FnOnce(&mut Trained), load: Load) -> Result<Trained, LearnError> {
         let samples = self.stretches.iter().map(Vec::len).sum::<usize>();
         let span_s = |stretch: &Vec<Signal>| match (stretch.first(), stretch.last()) {
@@ -203,7 +203,7 @@ impl<'a> Course<'a> {
             version: 0,
             detector: self.name.to_owned(),
             joints: self.joints.clone(),
-            // Three decimals, which every reader of JSON gives back unchanged.
+            // Three decimals survive writing to and reading from JSON.
             rate_hz: (1e3 * (samples - self.stretches.len()) as f64 / seconds).round() / 1e3,
             samples: samples as u64,
             seed: self.task.seed,

@@ -1,8 +1,8 @@
-//! Equation 8 of Tajiri and Iwamoto: every dimension of the input to 0..1 over the training data.
+//! Equation 8 of Tajiri and Iwamoto: scales every dimension of the input to 0..1 over the training data.
 
 use crate::frame::{Trained, TrainedError};
 
-/// x ↦ (x - min) / (max - min), by dimension. A dimension that never changed in training becomes 0.
+/// The scaling x ↦ (x - min) / (max - min), by dimension. A dimension that was constant in training becomes 0.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Scaling {
     min: Vec<f64>,
@@ -10,7 +10,7 @@ pub(crate) struct Scaling {
 }
 
 impl Scaling {
-    /// The scaling to 0..1 of rows of `dimensions` numbers each.
+    /// Returns the scaling to 0..1 of rows of `dimensions` numbers each.
     pub fn fit<'a>(dimensions: usize, rows: impl Iterator<Item = &'a [f64]>) -> Self {
         let mut min = vec![f64::INFINITY; dimensions];
         let mut max = vec![f64::NEG_INFINITY; dimensions];
@@ -23,7 +23,7 @@ impl Scaling {
         Self { min, max }
     }
 
-    /// Scales in place.
+    /// Scales a row in place.
     pub fn apply(&self, row: &mut [f64]) {
         for ((value, min), max) in row.iter_mut().zip(&self.min).zip(&self.max) {
             let range = max - min;
@@ -35,28 +35,28 @@ impl Scaling {
         }
     }
 
-    /// What was scaled to `value` in `dimension`.
+    /// Inverts the scaling of `value` in `dimension`.
     pub fn undo(&self, dimension: usize, value: f64) -> f64 {
         let (min, max) = (self.min[dimension], self.max[dimension]);
         min + value * (max - min)
     }
 
-    /// How many dimensions it scales.
+    /// Returns the number of dimensions.
     pub fn dimensions(&self) -> usize {
         self.min.len()
     }
 
-    /// Keeps it under the names `<name>.min` and `<name>.max`.
+    /// Saves the scaling under the names `<name>.min` and `<name>.max`.
     pub fn save(&self, name: &str, into: &mut Trained) {
         let shape = [self.min.len()];
         into.put_f64(&format!("{name}.min"), &shape, &self.min);
         into.put_f64(&format!("{name}.max"), &shape, &self.max);
     }
 
-    /// What [`Scaling::save`] kept.
+    /// Loads a scaling that [`Scaling::save`] saved.
     ///
     /// # Errors
-    /// If it is not there or has another size.
+    /// If it is missing or has another size.
     pub fn load(name: &str, dimensions: usize, from: &Trained) -> Result<Self, TrainedError> {
         Ok(Self {
             min: from.get_f64(&format!("{name}.min"), &[dimensions])?,

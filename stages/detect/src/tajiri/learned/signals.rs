@@ -1,4 +1,4 @@
-//! What the learned methods see of the arm: positions, velocities and external torques, all through
+//! Input signals of the learned methods: positions, velocities and external torques, all filtered by
 //! the same low-pass (section IV-B: "for all methods, low-pass filtered data were input").
 
 use tauscope_bus::{JointArray, TwinState, flags};
@@ -7,25 +7,25 @@ use tauscope_dynamics::lowpass::Butterworth2;
 use crate::frame::momentum::MomentumObserver;
 use crate::frame::{ConfigError, Lesson, Setup, SignalSettings};
 
-/// The arm at one instant, low-passed; entries beyond the joints are zero.
+/// Low-passed state of the arm at one instant; entries beyond the joints are zero.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Signal {
     /// Time of the sample \[ns\].
     pub stamp_ns: i64,
-    /// External torque that the momentum observer sees \[N m\].
+    /// External torque that the momentum observer estimates \[N m\].
     pub torque: JointArray,
     /// Position \[rad\].
     pub position: JointArray,
     /// Velocity \[rad/s\].
     pub velocity: JointArray,
-    /// Velocity at the sample before \[rad/s\].
+    /// Velocity at the previous sample \[rad/s\].
     pub previous_velocity: JointArray,
 }
 
-/// Makes [`Signal`]s of a twin's samples. No allocation per sample.
+/// Computes [`Signal`]s from a twin's samples. No allocation per sample.
 pub(crate) struct Signals {
     observer: MomentumObserver,
-    /// By joint: torque, position, velocity.
+    /// Low-passes of torque, position and velocity, by joint.
     filters: Vec<[Butterworth2; 3]>,
     settling_time_s: f64,
     started_ns: i64,
@@ -34,7 +34,7 @@ pub(crate) struct Signals {
 }
 
 impl Signals {
-    /// Signals of the robot of `setup`; `detector` asks for them.
+    /// Creates the signals of the robot of `setup`; `detector` is named in errors.
     ///
     /// # Errors
     /// If `setup` has no model.
@@ -56,8 +56,8 @@ impl Signals {
         })
     }
 
-    /// Takes the next sample; the signal, once everything between it and the arm has settled.
-    /// [`flags::RESET`] begins anew.
+    /// Processes the next sample. Returns the signal once the twin, the observer and the low-passes have settled.
+    /// [`flags::RESET`] restarts the settling.
     pub fn update(&mut self, sample: &TwinState) -> Option<&Signal> {
         let stamp_ns = sample.header.stamp_ns;
         let torque = *self.observer.update(sample);
@@ -92,7 +92,7 @@ impl Signals {
         settled.then_some(&self.signal)
     }
 
-    /// The contact-free stretches of recordings, each without a gap in it.
+    /// Returns the contact-free segments of recordings, each without a gap.
     pub fn stretches(&mut self, lessons: &[Lesson]) -> Vec<Vec<Signal>> {
         let mut stretches = Vec::new();
         for lesson in lessons {

@@ -1,11 +1,11 @@
-//! How the nets are trained: batches in a new order in every epoch, gradients by backpropagation
-//! (Goodfellow, Bengio and Courville, Deep Learning, 2016, sections 6.5 and 10.2), a step of Adam a batch.
+//! Training of the networks: batches in a new order in every epoch, gradients by backpropagation
+//! (Goodfellow, Bengio and Courville, Deep Learning, 2016, sections 6.5 and 10.2), one Adam step per batch.
 //!
-//! The matrices of a batch serve the next one, too, if it has the same size. The arithmetic is generic so that
-//! tests hold the gradients against differences of 64-bit numbers; nets train with 32 bits.
+//! The matrices of a batch are reused for the next one of the same size. The arithmetic is generic so that tests can
+//! compare the gradients with finite differences in 64-bit arithmetic; networks are trained in 32 bits.
 //!
-//! Matrices that must be turned over are copied, not viewed: `gemm` of nalgebra 0.34.2 reads and writes beyond
-//! small matrices whose rows are apart in memory (its `axcpy` takes the slice's length for the vector's).
+//! Transposed matrices are copied, not viewed: `gemm` of nalgebra 0.34.2 reads and writes out of bounds of
+//! small matrices with non-contiguous rows (its `axcpy` confuses the slice's length with the vector's).
 
 mod adam;
 mod dense;
@@ -25,20 +25,20 @@ use adam::{Adam, Weight};
 pub(crate) use dense_net::DenseNet;
 pub(crate) use recurrent::{Recurrent, Sequence};
 
-/// The numbers of a net.
+/// The number type of a network.
 pub(crate) trait Real: RealField + Copy {}
 
 impl Real for f32 {}
 impl Real for f64 {}
 
-/// What is trained.
+/// A network in training.
 pub(crate) trait Net<T> {
-    /// All that is learned, always in the same order.
+    /// Returns all learned weights, always in the same order.
     fn weights(&mut self) -> Vec<&mut Weight<T>>;
 }
 
-/// Goes through the training data `settings.epochs` times, in a new order and in batches, one Adam step
-/// a batch. `examples` lists what an epoch consists of; `learn` sets the gradients of the loss of a batch of them.
+/// Trains for `settings.epochs` passes over the data, each in a new order and in batches, with one Adam step per
+/// batch. `examples` lists the examples of an epoch; `learn` sets the gradients of the loss of a batch of them.
 pub(crate) fn fit<T: Real, E, N: Net<T>>(
     settings: &TrainingSettings,
     net: &mut N,
@@ -57,8 +57,8 @@ pub(crate) fn fit<T: Real, E, N: Net<T>>(
     }
 }
 
-/// The factor of one unit in training: a share `dropout` of the units is left out, the others make up for it
-/// (Srivastava et al., Dropout, 2014, section 10, scaled in training). Draws nothing without dropout.
+/// Returns the factor of one unit in training: a share `dropout` of the units is dropped, the others are scaled to
+/// compensate (Srivastava et al., Dropout, 2014, section 10). Draws no random number without dropout.
 fn drop_out<T: Real>(dropout: f64, rng: &mut ChaCha8Rng) -> T {
     if dropout == 0.0 {
         T::one()
@@ -69,12 +69,12 @@ fn drop_out<T: Real>(dropout: f64, rng: &mut ChaCha8Rng) -> T {
     }
 }
 
-/// As a net's number.
+/// Converts to the network's number type.
 fn number<T: Real>(number: f64) -> T {
     nalgebra::convert(number)
 }
 
-/// Their sum, in eight parts that a processor adds at once.
+/// Returns the sum of the numbers, from eight partial sums that the compiler can vectorise.
 fn sum<T: Real>(numbers: &[T]) -> T {
     let mut parts = [T::zero(); 8];
     let chunks = numbers.chunks_exact(parts.len());

@@ -1,5 +1,5 @@
-//! Detectors that judge one vector of external torques: those of one sample, or of a window of samples
-//! one after the other, oldest first.
+//! Detectors that judge one vector of external torques: those of one sample, or of a window of consecutive
+//! samples, oldest first.
 
 use std::collections::VecDeque;
 
@@ -8,12 +8,12 @@ use super::scaling::Scaling;
 use super::signals::Signal;
 use crate::frame::{Trained, TrainedError};
 
-/// Tells how unlike its training data a scaled vector is.
+/// Measures the dissimilarity of a scaled vector to its training data.
 pub(crate) trait VectorModel: Send {
-    /// The score; the larger, the less alike.
+    /// Returns the score; larger means less similar.
     fn score(&mut self, x: &[f64]) -> f64;
 
-    /// Keeps its arrays.
+    /// Saves its arrays.
     fn save(&self, into: &mut Trained);
 }
 
@@ -25,7 +25,7 @@ pub(crate) struct Vectors {
 }
 
 impl Vectors {
-    /// The windows of `window` samples in the training data of `course`, one every `stride` samples.
+    /// Collects the windows of `window` samples in the training data of `course`, one every `stride` samples.
     pub fn new(course: &Course<'_>, window: usize, stride: usize) -> Self {
         let joints = course.joint_count();
         let mut rows = Vec::new();
@@ -43,7 +43,7 @@ impl Vectors {
         Self { scaling, rows }
     }
 
-    /// Vectors that are scaled already, for tests of the models.
+    /// Creates vectors that are already scaled, for tests of the models.
     #[cfg(test)]
     pub fn unscaled(dimensions: usize, rows: Vec<f64>) -> Self {
         let ends = [vec![0.0; dimensions], vec![1.0; dimensions]];
@@ -51,17 +51,17 @@ impl Vectors {
         Self { scaling, rows }
     }
 
-    /// All of them, one after the other.
+    /// Returns all vectors, concatenated.
     pub fn rows(&self) -> &[f64] {
         &self.rows
     }
 
-    /// Numbers in one of them.
+    /// Returns the length of a vector.
     pub fn dimensions(&self) -> usize {
         self.scaling.dimensions()
     }
 
-    /// Keeps a model that was trained on them.
+    /// Saves a model that was trained on the vectors.
     pub fn save(&self, model: &dyn VectorModel, into: &mut Trained) {
         self.scaling.save("input", into);
         model.save(into);
@@ -73,16 +73,16 @@ pub(crate) struct VectorScorer<M> {
     joints: usize,
     scaling: Scaling,
     model: M,
-    /// The torques of the last samples, oldest first; full when a window is.
+    /// Torques of the newest samples, oldest first, up to one window.
     torques: VecDeque<f64>,
     row: Vec<f64>,
 }
 
 impl<M: VectorModel> VectorScorer<M> {
-    /// What [`Vectors::save`] kept; `load` reads the model.
+    /// Loads what [`Vectors::save`] saved; `load` reads the model.
     ///
     /// # Errors
-    /// If an array is not there or has another shape.
+    /// If an array is missing or has another shape.
     pub fn load(
         from: &Trained,
         load: impl Fn(usize, &Trained) -> Result<M, TrainedError>,

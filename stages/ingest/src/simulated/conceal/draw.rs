@@ -1,4 +1,4 @@
-//! What an effect may look like: a place at random, and there what the effect itself draws.
+//! Random draw of an effect: its place, and the parameters that the effect draws there.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -10,25 +10,25 @@ use tauscope_dynamics::terms::{
 use super::fit_count;
 use super::plan::Plan;
 
-/// Every effect that is drawn.
+/// Returns the effects that can be drawn.
 pub(super) fn drawn() -> impl Iterator<Item = &'static Effect> {
     let all = EFFECTS.iter().copied();
     all.filter(|effect| effect.concealed.is_some())
 }
 
-/// An effect at a place, of any size.
+/// An effect at a place, whose size is still open.
 pub(super) struct Candidate {
     place: TermSpec,
     drawn: Drawn,
 }
 
 impl Candidate {
-    /// Least and largest size.
+    /// Smallest and largest size.
     pub fn sizes(&self) -> [f64; 2] {
         self.drawn.sizes
     }
 
-    /// The term of this size.
+    /// Returns the term of this size.
     pub fn term(&self, size: f64) -> TermSpec {
         let parameters = (self.drawn.parameters)(size).into_iter();
         TermSpec {
@@ -40,7 +40,7 @@ impl Candidate {
     }
 }
 
-/// To four digits.
+/// Rounds to four significant digits.
 pub(super) fn rounded(value: f64) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
@@ -49,7 +49,7 @@ pub(super) fn rounded(value: f64) -> f64 {
     (value * digits).round() / digits
 }
 
-/// A seed's random numbers.
+/// Random numbers of a seed.
 struct Numbers<'r>(&'r mut ChaCha8Rng);
 
 impl Chance for Numbers<'_> {
@@ -66,10 +66,10 @@ impl Chance for Numbers<'_> {
     }
 }
 
-/// An effect at a random place; `None` where that place is impossible.
+/// Draws an effect at a random place; `None` if the effect is impossible there.
 ///
-/// What several effects draw alike, a share, a direction and a sign, is drawn in turn until it is the effect's: so a seed
-/// draws the same whatever effects there are.
+/// Several effects use the same numbers: a share, a direction and a sign. They are drawn in this order until the turn
+/// of the effect, so that the draw of a seed does not depend on which effects exist.
 pub(super) fn candidate(
     effect: &'static Effect,
     plan: &Plan,
@@ -99,7 +99,7 @@ pub(super) fn candidate(
     None
 }
 
-/// When an effect's own numbers are drawn.
+/// Turn in which an effect's own numbers are drawn.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
     Joint,
@@ -118,7 +118,7 @@ impl Turn {
     }
 }
 
-/// What several effects draw alike.
+/// Random numbers that several effects use.
 #[derive(Clone, Copy)]
 struct Fixed {
     share: f64,

@@ -1,4 +1,4 @@
-//! The motions as they are planned, and what physics would change there.
+//! Planned motions, and the effect of physics on their efforts.
 
 use tauscope_dynamics::terms::{MotionSample, Physics, TermSpec};
 use tauscope_dynamics::{Data, Model, rnea};
@@ -9,16 +9,16 @@ use super::super::scenario::Scenario;
 use super::super::sensors::effort_noise_nm;
 use super::super::trajectory::{JointRange, Target};
 
-/// Instants a second.
-/// Resolution: of the effort that an effect is measured by.
+/// Sampling rate of the planned motions \[Hz\].
+/// Resolution: of the effort by which an effect is sized.
 const RATE_HZ: f64 = 100.0;
-/// Without noise, what counts as such: a share of the motor's effort.
+/// Noise assumed for noiseless sensors, as a fraction of the motor's effort.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const NO_NOISE: f64 = 0.002;
-/// The share of their efforts that motors are used to.
+/// Largest fraction of a motor's effort that the motions may need with the effect.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MOTOR_SHARE: f64 = 0.9;
-/// A smaller change is none \[N m\].
+/// Effort change below which an instant is treated as unchanged \[N m\].
 /// Resolution: above the rounding of efforts.
 const NOTHING: f64 = 1e-9;
 
@@ -31,24 +31,28 @@ pub(super) struct Instant {
     rigid: Vec<f64>,
 }
 
-/// The motions of a scenario.
+/// The planned motions of a scenario.
 #[derive(Debug)]
 pub(super) struct Plan {
     /// The arm with its tool.
     pub model: Model,
     pub joints: Vec<JointRange>,
     pub instants: Vec<Instant>,
-    /// Of each recording \[s\], and when it starts in the session.
+    /// Duration of each recording \[s\].
     pub durations_s: Vec<f64>,
+    /// Start of each recording in the session \[s\].
     pub starts_s: Vec<f64>,
-    /// By joint: fastest, highest acceleration, largest effort, and the motor's.
+    /// Highest speed of each joint.
     pub fastest: Vec<f64>,
+    /// Highest acceleration of each joint.
     pub largest_acceleration: Vec<f64>,
+    /// Largest rigid-body effort of each joint.
     pub largest_nm: Vec<f64>,
+    /// Effort limit of each motor.
     pub motor_nm: Vec<f64>,
     noise_nm: Vec<f64>,
     terms: Vec<TermSpec>,
-    /// What is recorded with those terms, instant by instant.
+    /// Recorded efforts with those terms, instant by instant.
     efforts: Vec<f64>,
 }
 
@@ -120,14 +124,14 @@ impl Plan {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Makes a term part of the arm.
+    /// Adds a term to the arm.
     pub fn add(&mut self, term: TermSpec) -> Result<(), ScenarioError> {
         self.terms.push(term);
         self.efforts = self.recorded(None)?;
         Ok(())
     }
 
-    /// How much of the effort's noise the term changes in the joint that it changes most.
+    /// Returns the effort change by the term in multiples of the noise, at the joint that it changes most.
     pub fn times_noise(&self, term: &TermSpec) -> Result<f64, ScenarioError> {
         let efforts = self.recorded(Some(term))?;
         let n = self.joints.len();
@@ -146,7 +150,7 @@ impl Plan {
         Ok(most.fold(0.0, f64::max))
     }
 
-    /// Whether the motors can do the motions with the term.
+    /// Returns whether the motors can drive the motions with the term.
     pub fn motors_can(&self, term: &TermSpec) -> Result<bool, ScenarioError> {
         let efforts = self.recorded(Some(term))?;
         let n = self.joints.len();

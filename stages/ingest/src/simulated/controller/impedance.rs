@@ -12,25 +12,25 @@ use super::super::plant::{Damping, Drive};
 use super::super::scenario::{Damps, ImpedanceSpec};
 use super::super::trajectory::{JointRange, Target};
 
-/// Keeps the projection into the null space smooth where the arm is stretched; squared \[m²\].
+/// Regularization of the null-space projection near singular postures \[m²\].
 /// Resolution: 1 mm squared, far below an arm's lever.
 const SMOOTH: f64 = 1e-6;
 
-/// Keeps the tool where it should be, as a spring and a damper would.
+/// Holds the tool at its reference like a spring and a damper.
 ///
 /// Equation 1 with I = 0, as in the paper's section III-A: `F = B Δξ' + K Δξ`, where Δξ is the
 /// displacement of the tool from its reference and the vector part of the unit quaternion of its rotation,
 /// both along the base's axes. Equations 2 and 3: `effort = Jᵀ F + C(q, qd) qd`, and gravity, which the
 /// paper leaves to the robot's own controller.
 ///
-/// Motion that leaves the tool where it is, where the arm has more joints than that takes, is held by
-/// `N (k (q_d - q) + b (qd_d - qd))` with `N = 1 - Jᵀ (J Jᵀ)⁻¹ J`. At rest it takes nothing off F.
+/// A redundant arm can move without moving the tool. That null-space motion is held by
+/// `N (k (q_d - q) + b (qd_d - qd))` with `N = 1 - Jᵀ (J Jᵀ)⁻¹ J`, which at rest does not change F.
 #[derive(Debug)]
 pub(in super::super) struct ImpedanceController {
     model: Model,
     data: Data,
     held: LinkPoint,
-    /// Of translation and rotation: by displacement and the quaternion's vector part.
+    /// Stiffness of translation, per displacement, and of rotation, per vector part of the quaternion.
     stiffness: [f64; 2],
     damping: [f64; 2],
     damps: Damps,
@@ -74,7 +74,7 @@ impl ImpedanceController {
         })
     }
 
-    /// Takes a new target and what the encoders say.
+    /// Takes a new target and the encoder readings.
     pub fn update(&mut self, target: &Target, position: &[f64], velocity: &[f64]) {
         let n = position.len();
         let (model, data) = (&self.model, &mut self.data);
@@ -112,7 +112,7 @@ impl ImpedanceController {
         let transposed = jacobian.transpose();
         let square = &jacobian * &transposed + Matrix6::identity() * SMOOTH;
         let mut null_space = DMatrix::identity(n, n);
-        // Positive definite, as long as the positions are numbers.
+        // Positive definite, unless a position is NaN.
         if let Some(factors) = square.cholesky() {
             null_space -= &transposed * factors.solve(&jacobian);
         }
@@ -129,7 +129,7 @@ impl ImpedanceController {
             + null_space * self.null_damping;
     }
 
-    /// What it tells the drives.
+    /// Returns the command to the drives.
     pub fn drive(&self) -> Drive<'_> {
         Drive {
             effort_nm: &self.effort_nm,

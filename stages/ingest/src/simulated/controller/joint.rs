@@ -1,7 +1,7 @@
-//! Control of the joints: PD, an integral part, and the nominal model's effort ahead.
+//! Joint control: PD, an integral part, and feedforward of the nominal model's effort.
 //!
 //! As in a real arm, the position loop is slow and the drives' velocity loops are fast: the former is
-//! taken at its instants, the latter without delay, so that it is stable however light a joint is.
+//! sampled, the latter act without delay, so that control is stable however light a joint is.
 
 use tauscope_bus::{JointArray, MAX_JOINTS};
 use tauscope_dynamics::{Data, Model, mass_matrix, rnea};
@@ -10,15 +10,15 @@ use super::super::plant::{Damping, Drive};
 use super::super::scenario::ControllerSettings;
 use super::super::trajectory::{JointRange, Target};
 
-/// The integral part may use this share of a joint's effort limit.
+/// Largest fraction of a joint's effort limit that the integral part may use.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const INTEGRAL_SHARE: f64 = 0.5;
-/// Motors are chosen such that they could accelerate their own rotor like this \[rad/s²\]; gains are
-/// made for that inertia where it is more than the arm's.
+/// Acceleration of a motor's free rotor at its effort limit, from which the rotor's inertia is estimated
+/// \[rad/s²\]. Gains are designed for that inertia where it exceeds the arm's.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MOTOR_ACCELERATION: f64 = 30.0;
 
-/// Keeps each joint where it should be.
+/// Position control of each joint.
 #[derive(Debug)]
 pub(in super::super) struct JointController {
     model: Model,
@@ -34,8 +34,8 @@ pub(in super::super) struct JointController {
 }
 
 impl JointController {
-    /// A controller whose gains give each joint the wished frequency and damping where the arm is at
-    /// `position`.
+    /// Creates a controller whose gains give each joint the configured frequency and damping with the arm
+    /// at `position`.
     pub fn new(
         model: &Model,
         settings: &ControllerSettings,
@@ -71,7 +71,7 @@ impl JointController {
         controller
     }
 
-    /// Takes a new target, `dt_s` after the one before.
+    /// Takes a new target, `dt_s` after the previous one.
     pub fn update(&mut self, dt_s: f64, target: &Target, position: &[f64]) {
         let n = position.len();
         let ahead = rnea(
@@ -91,7 +91,7 @@ impl JointController {
         self.target = *target;
     }
 
-    /// What it tells the drives, `elapsed_s` after the target.
+    /// Returns the command to the drives, `elapsed_s` after the target.
     pub fn drive(&mut self, elapsed_s: f64) -> Drive<'_> {
         for (j, velocity) in self.velocity_target.iter_mut().enumerate() {
             *velocity = self.target.velocity[j] + elapsed_s * self.target.acceleration[j];

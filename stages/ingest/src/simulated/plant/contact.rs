@@ -1,4 +1,4 @@
-//! Forces of what touches the arm.
+//! Contact forces on the arm.
 
 use nalgebra::Vector3;
 use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian, link_pose};
@@ -8,17 +8,17 @@ use super::super::scenario::{ContactKind, LabelSpec};
 use super::super::simulation::Event;
 use super::Plant;
 
-/// A force that acts on the arm now.
+/// A contact force on the arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) struct Contact {
     pub link: usize,
-    /// In the link's frame \[m\].
+    /// Point of application in the link's frame \[m\].
     pub point_m: [f64; 3],
-    /// On the robot, world frame \[N\].
+    /// Force on the robot, world frame \[N\].
     pub force_n: [f64; 3],
 }
 
-/// Takes `Jᵀ F` off the load.
+/// Subtracts `Jᵀ F` from the load.
 pub(super) fn add_contact(
     model: &Model,
     data: &mut Data,
@@ -39,7 +39,7 @@ pub(super) fn add_contact(
 }
 
 impl Plant {
-    /// Where a point of a link is in the world \[m\], and its velocity \[m/s\].
+    /// Returns the position of a point of a link in the world \[m\], and its velocity \[m/s\].
     pub fn motion_of(&mut self, point: &LinkPoint) -> (Vector3<f64>, Vector3<f64>) {
         forward_kinematics(&self.model, &mut self.data, &self.link_position);
         let place = point.pose(&self.model, &self.data).translation.vector;
@@ -51,14 +51,14 @@ impl Plant {
         (place, velocity)
     }
 
-    /// A point of the world in a link's frame \[m\].
+    /// Converts a point of the world to a link's frame \[m\].
     pub fn in_link(&mut self, link: usize, world_m: Vector3<f64>) -> [f64; 3] {
         forward_kinematics(&self.model, &mut self.data, &self.link_position);
         let pose = link_pose(&self.model, &self.data, link);
         (pose.rotation.inverse() * (world_m - pose.translation.vector)).into()
     }
 
-    /// A contact as the labels tell of it, if this is its peak.
+    /// Returns the labelled event of a contact whose peak is `peak`.
     pub fn event_of(
         &mut self,
         peak: &Contact,
@@ -69,7 +69,7 @@ impl Plant {
         let mut load = vec![0.0; self.link_position.len()];
         let (model, data) = (&self.model, &mut self.data);
         add_contact(model, data, &self.link_position, peak, &mut load);
-        // Just placed for the contact.
+        // `add_contact` has just computed the forward kinematics.
         let pose = link_pose(model, data, peak.link);
         let point = pose.translation.vector + pose.rotation * Vector3::from(peak.point_m);
         let mut joints = Vec::new();

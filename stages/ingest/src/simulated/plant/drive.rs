@@ -1,18 +1,18 @@
-//! What the drives are told.
+//! Commands to the drives.
 
 use nalgebra::DMatrix;
 
-/// Effort by velocity error \[N m s/rad\].
+/// Gain from velocity error to effort \[N m s/rad\].
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) enum Damping<'a> {
-    /// Each joint's by its own.
+    /// Decoupled: one gain per joint.
     Joints(&'a [f64]),
-    /// Each joint's by all: symmetric, and it takes energy off every motion or none.
+    /// Coupled: a symmetric, positive semidefinite matrix.
     Coupled(&'a DMatrix<f64>),
 }
 
 impl Damping<'_> {
-    /// Of joint `j` by its own velocity.
+    /// Returns the gain from the velocity of joint `j` to its own effort.
     pub fn of(&self, j: usize) -> f64 {
         match self {
             Self::Joints(damping) => damping[j],
@@ -21,7 +21,7 @@ impl Damping<'_> {
     }
 }
 
-/// Velocities of the motors: the place of each joint's among velocities, and those.
+/// Velocities of the motors: the index of each joint's motor, and the velocities that it refers to.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Motors<'a>(pub &'a [usize], pub &'a [f64]);
 
@@ -31,21 +31,21 @@ impl Motors<'_> {
     }
 }
 
-/// What the drives are told: an effort, and a velocity to keep to. Their own loop is fast, so it acts
+/// Command to the drives: an effort and a velocity setpoint. The drives' own velocity loop is fast, so it acts
 /// on the velocity at the end of a step.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Drive<'a> {
-    /// \[N m\]
+    /// Effort to which the velocity loop adds \[N m\].
     pub effort_nm: &'a [f64],
     pub damping: Damping<'a>,
-    /// The velocity to keep to \[rad/s\].
+    /// Velocity setpoint \[rad/s\].
     pub velocity: &'a [f64],
-    /// The most a drive can give, either way \[N m\].
+    /// Effort limit of each drive, in both directions \[N m\].
     pub limit_nm: &'a [f64],
 }
 
 impl Drive<'_> {
-    /// The effort of joint `j`, and whether it is all that the drive can give.
+    /// Returns the effort of joint `j`, and whether the drive's limit saturates it.
     pub(super) fn effort(&self, j: usize, motors: Motors<'_>) -> (f64, bool) {
         let missing = |k: usize| self.velocity[k] - motors.velocity(k);
         let free = match self.damping {

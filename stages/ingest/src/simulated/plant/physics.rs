@@ -1,4 +1,4 @@
-//! What the URDF does not tell of, sorted by how the plant suffers it.
+//! Physics beyond the URDF, sorted by the way in which the plant simulates it.
 
 use nalgebra::DMatrix;
 use tauscope_dynamics::terms::{MotionSample, Simulated, Term, TermSpec};
@@ -7,16 +7,16 @@ use tauscope_dynamics::{Inertia, Model};
 use super::super::error::ScenarioError;
 use super::transmission::Rotor;
 
-/// A body that is carried for a while.
+/// A body that is carried for part of the recording.
 #[derive(Debug)]
 pub(super) struct Carried {
     link: usize,
     inertia: Inertia,
-    /// \[s from the start of the recording\]
+    /// Begin and end \[s from the start of the recording\].
     window_s: [f64; 2],
 }
 
-/// The physics of an arm. Terms that last and change its bodies are in `model` already.
+/// The physics of an arm. `model` already includes the permanent terms of its bodies.
 #[derive(Debug)]
 pub(super) struct Physics {
     pub model: Model,
@@ -27,7 +27,7 @@ pub(super) struct Physics {
 }
 
 impl Physics {
-    /// Sorts `specs`; what acts on the record only is left to the sensors.
+    /// Sorts `specs`; skips the terms that act on the record only.
     pub fn new(nominal: &Model, specs: &[TermSpec]) -> Result<Self, ScenarioError> {
         let mut model = nominal.clone();
         let mut carried = Vec::new();
@@ -95,7 +95,7 @@ impl Carried {
     }
 }
 
-/// Forces from outside.
+/// External forces.
 #[derive(Debug)]
 pub(super) struct Loads {
     terms: Vec<Box<dyn Term>>,
@@ -103,7 +103,7 @@ pub(super) struct Loads {
 }
 
 impl Loads {
-    /// Adds the effort that they cost where the links are now; times \[s\].
+    /// Adds the effort that they cost at the links' position; times \[s\].
     pub fn add(&mut self, position: &[f64], recording_s: f64, session_s: f64, load: &mut [f64]) {
         let at = MotionSample {
             dt_s: 0.0,
@@ -120,14 +120,14 @@ impl Loads {
     }
 }
 
-/// The step that is being taken.
+/// The current step.
 pub(super) struct Step<'a> {
-    /// Where the links are \[rad\].
+    /// Position of the links \[rad\].
     pub position: &'a [f64],
-    /// The velocity of the links it begins with.
+    /// Velocity of the links at the beginning of the step.
     pub before: &'a [f64],
     pub rotors: &'a [Rotor],
-    /// What acts without the physics and without acceleration \[N m\].
+    /// Effort at zero acceleration without the joint terms \[N m\].
     pub load: &'a [f64],
     pub inertia: &'a DMatrix<f64>,
     pub dt_s: f64,
@@ -135,7 +135,7 @@ pub(super) struct Step<'a> {
     pub session_s: f64,
 }
 
-/// What acts in the joints, on the side of the motors.
+/// Terms that act in the joints, on the motor side.
 #[derive(Debug)]
 pub(super) struct JointTerms {
     terms: Vec<Box<dyn Term>>,
@@ -146,8 +146,8 @@ pub(super) struct JointTerms {
 }
 
 impl JointTerms {
-    /// The effort that it costs to end the step with `velocity`: of the links, and after them of the
-    /// rotors. `elapsed_s` passes for what has a memory: 0 only tries.
+    /// Computes the effort that the terms cost if the step ends with `velocity`, of the links followed by
+    /// the rotors. Terms with internal state advance by `elapsed_s`; 0 is a trial evaluation.
     pub fn cost(&mut self, step: &Step<'_>, elapsed_s: f64, velocity: &[f64], effort: &mut [f64]) {
         let n = step.position.len();
         let (links, rotors) = velocity.split_at(n);

@@ -1,29 +1,30 @@
-//! A joint whose rotor and link are two masses, with a spring or play in between.
+//! Two-mass joints: rotor and link, coupled by a spring or backlash.
 
 use tauscope_dynamics::terms::{Compliance, Term};
 
-/// A spring is taken where it is as a step begins, which takes no energy off it, unless the lighter mass
-/// would swing through more than this in a step \[rad²\]; then it is taken where the step ends.
-/// Resolution: the error of the explicit integration, against its energy being kept.
+/// Largest squared phase of the lighter mass's oscillation per step for which the spring is integrated
+/// explicitly, which conserves its energy \[rad²\]. A stiffer spring is integrated implicitly.
+/// Resolution: the error of the explicit integration, against conservation of energy.
 const SLOW: f64 = 0.1;
 
-/// The rotor of a joint. Its encoder is what is recorded; the link moves as it likes.
+/// The rotor of a joint. It carries the recorded encoder; the link moves independently.
 #[derive(Debug, Clone)]
 pub(super) struct Rotor {
     pub joint: usize,
-    /// Coordinates of the term, and what is between rotor and link by them and the inertia that the joint moves.
+    /// Coordinates of the term.
     coordinates: Vec<f64>,
+    /// Coupling of rotor and link, from the coordinates and the inertia that the joint moves.
     compliance: fn(&[f64], f64) -> Compliance,
-    /// \[kg m²\]
+    /// Rotor inertia \[kg m²\].
     pub inertia: f64,
-    /// \[rad\]
+    /// Rotor position \[rad\].
     pub position: f64,
-    /// \[rad/s\]
+    /// Rotor velocity \[rad/s\].
     pub velocity: f64,
 }
 
-/// Torque on the link, and what makes it grow in a step \[N m, N m s/rad\]:
-/// `torque + slope (rotor velocity - link velocity)` with the velocities at the end of the step.
+/// Torque on the link, linear in the velocities at the end of the step \[N m, N m s/rad\]:
+/// `torque + slope (rotor velocity - link velocity)`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Coupling {
     pub torque: f64,
@@ -37,7 +38,7 @@ impl Coupling {
 }
 
 impl Rotor {
-    /// The rotor of a term that splits its joint.
+    /// Creates the rotor of a term that splits its joint.
     pub fn new(term: &dyn Term, compliance: fn(&[f64], f64) -> Compliance, joint: usize) -> Self {
         let coordinates = term.coordinates().to_vec();
         Self {
@@ -50,15 +51,15 @@ impl Rotor {
         }
     }
 
-    /// How far the link hangs behind a rotor at rest that holds `load` \[rad\]. `inertia` is what the
-    /// joint moves \[kg m²\].
+    /// Returns the deflection of the link from a rotor at rest that holds `load` \[rad\]. `inertia` is the
+    /// inertia that the joint moves \[kg m²\].
     pub fn sag(&self, load: f64, inertia: f64) -> f64 {
         let between = (self.compliance)(&self.coordinates, inertia);
         let half = between.half_gap.unwrap_or(0.0);
         -load / between.stiffness - half.copysign(load)
     }
 
-    /// What comes through in a step of `dt_s` that begins with the link at `position` and `velocity`.
+    /// Returns the coupling in a step of `dt_s` that begins with the link at `position` and `velocity`.
     pub fn coupling(&self, position: f64, velocity: f64, inertia: f64, dt_s: f64) -> Coupling {
         let Compliance {
             stiffness,
@@ -69,7 +70,7 @@ impl Rotor {
         if let Some(half) = half_gap {
             twist -= twist.clamp(-half, half);
             let push = stiffness * twist + damping * (self.velocity - velocity);
-            // A contact pushes and never pulls.
+            // Unilateral: a contact pushes and never pulls.
             if twist * push <= 0.0 {
                 return Coupling::default();
             }

@@ -1,35 +1,35 @@
-//! What touches the arm.
+//! Contacts and obstacles in a scenario.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A push at a chosen time. Pushes may overlap, each other and obstacles.
+/// A push at a chosen time. Pushes may overlap with each other and with obstacles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ContactSpec {
     /// The link that is touched.
     pub link: String,
-    /// Where, in the link's frame \[m\]; by default at its centre of mass.
+    /// Point of application in the link's frame \[m\]; by default its centre of mass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub point_m: Option<[f64; 3]>,
     /// Force on the robot at its peak, world frame \[N\].
     pub force_n: [f64; 3],
-    /// When it begins \[s from the start of the recording\].
+    /// Begin \[s from the start of the recording\].
     #[schemars(range(min = 0.0))]
     pub t_on_s: f64,
-    /// When it has ended \[s from the start of the recording\].
+    /// End \[s from the start of the recording\].
     pub t_off_s: f64,
-    /// How long the force takes to rise, and to fall; at most half of the time from begin to end \[s\].
+    /// Rise time and fall time of the force; at most half of the time from begin to end \[s\].
     #[serde(default = "default_rise_s")]
     #[schemars(range(min = 0.001))]
     pub rise_s: f64,
-    /// How it rises and falls.
+    /// Profile of the force over time.
     #[serde(default, skip_serializing_if = "is_default")]
     pub profile: Profile,
-    /// What it is called in the labels.
+    /// Kind of contact in the labels.
     #[serde(default)]
     pub kind: ContactKind,
-    /// What else the labels say of it.
+    /// Further labels.
     #[serde(default, skip_serializing_if = "is_default")]
     pub label: LabelSpec,
 }
@@ -42,49 +42,49 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// What kind of contact it is, for the labels.
+/// Kinds of contact in the labels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ContactKind {
-    /// Of neither kind.
+    /// A contact of neither kind below.
     #[default]
     Contact,
-    /// By accident: short and hard.
+    /// An accident: short and hard.
     Collision,
-    /// Somebody leads the arm: the force rises slowly.
+    /// Hand guiding: the force rises slowly.
     Cooperation,
 }
 
-/// How a push rises and falls.
+/// Profiles of the force of a push over time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Profile {
-    /// Half cosines within `rise_s`, and the full force in between.
+    /// Half-cosine flanks of length `rise_s`, and the full force in between.
     #[default]
     Smooth,
-    /// Straight lines within `rise_s`, and the full force in between.
+    /// Linear flanks of length `rise_s`, and the full force in between.
     Trapezoid,
-    /// One half of a sine from the begin to the end; `rise_s` is not used.
+    /// A half sine from begin to end; `rise_s` is not used.
     HalfSine,
 }
 
-/// What labels say of a contact beyond where, when, and how hard.
+/// Labels of a contact in addition to its place, time and force.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LabelSpec {
-    /// Who cooperated.
+    /// Person who cooperated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub operator: Option<String>,
-    /// Whether they had done so before.
+    /// Whether this person had done so before.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub experienced: Option<bool>,
-    /// What was hit.
+    /// Material that was hit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// The motion it was hit in.
+    /// Motion during the impact.
     #[serde(rename = "move", skip_serializing_if = "Option::is_none")]
     pub motion: Option<String>,
-    /// Where in the workspace it was hit.
+    /// Zone of the workspace in which it was hit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zone: Option<String>,
 }
@@ -93,32 +93,32 @@ pub struct LabelSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HandsSpec {
-    /// How many.
+    /// Number of pushes.
     #[schemars(range(max = 100_000))]
     pub count: u32,
     /// Weakest and strongest force \[N\].
     #[serde(default = "default_force_n")]
     pub force_n: [f64; 2],
-    /// Shortest and longest \[s\].
+    /// Shortest and longest duration \[s\].
     #[serde(default = "default_hand_duration_s")]
     pub duration_s: [f64; 2],
     /// Links that are touched; by default all that move.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub links: Vec<String>,
-    /// None earlier than this \[s from the start of the recording\].
+    /// Earliest begin of a push \[s from the start of the recording\].
     #[serde(default = "default_after_s")]
     pub after_s: f64,
-    /// How long each takes to rise, and to fall \[s\].
+    /// Rise time and fall time of each force \[s\].
     #[serde(default = "default_rise_s")]
     #[schemars(range(min = 0.001))]
     pub rise_s: f64,
-    /// How they rise and fall.
+    /// Profile of the forces over time.
     #[serde(default, skip_serializing_if = "is_default")]
     pub profile: Profile,
-    /// What they are called in the labels.
+    /// Kind of contact in the labels.
     #[serde(default, skip_serializing_if = "is_default")]
     pub kind: ContactKind,
-    /// What else the labels say of them.
+    /// Further labels.
     #[serde(default, skip_serializing_if = "is_default")]
     pub label: LabelSpec,
 }
@@ -135,8 +135,8 @@ fn default_after_s() -> f64 {
     2.0
 }
 
-/// Something in the way: exactly one of `plane`, `box` and `sphere`, which a round tip on a link runs into.
-/// It pushes, along its normal and without friction, and never pulls.
+/// An obstacle: exactly one of `plane`, `box` and `sphere`, which a round tip on a link runs into. It pushes
+/// along its normal, without friction, and never pulls.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ObstacleSpec {
@@ -167,17 +167,17 @@ pub struct ObstacleSpec {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub radius_m: f64,
-    /// When it is put there \[s from the start of the recording\].
+    /// Time at which it appears \[s from the start of the recording\].
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub from_s: f64,
-    /// When it is taken away; by default never \[s from the start of the recording\].
+    /// Time at which it is removed; by default never \[s from the start of the recording\].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to_s: Option<f64>,
-    /// What running into it is called in the labels.
+    /// Kind of its contacts in the labels.
     #[serde(default = "collision")]
     pub kind: ContactKind,
-    /// What else the labels say of it.
+    /// Further labels of its contacts.
     #[serde(default, skip_serializing_if = "is_default")]
     pub label: LabelSpec,
 }
@@ -200,7 +200,7 @@ fn collision() -> ContactKind {
 pub struct PlaneSpec {
     /// A point of it, world frame \[m\].
     pub point_m: [f64; 3],
-    /// Where the arm may be: any length but 0, world frame.
+    /// Normal that points to the free side, of any length but 0, world frame.
     pub normal: [f64; 3],
 }
 

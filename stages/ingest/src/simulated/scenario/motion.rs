@@ -1,4 +1,4 @@
-//! How the arm moves.
+//! Motion of the arm in a scenario.
 
 use std::path::PathBuf;
 
@@ -6,11 +6,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_archive::CsvMapping;
 
-/// How the arm moves: exactly one of the three.
+/// Motion of the arm: exactly one of the three.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MotionSpec {
-    /// From point to point, with rests.
+    /// Motion from point to point, with rests.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub points: Option<PointsSpec>,
     /// Periodic excitation of all joints at once, as for identification.
@@ -22,28 +22,28 @@ pub struct MotionSpec {
 }
 
 /// Motion from point to point along quintic polynomials, all joints at once. At most one of `through`,
-/// `through_m` and `within` says which points; without them each is drawn at random from the joints' ranges.
+/// `through_m` and `within` selects the points; without them each is drawn at random from the joints' ranges.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PointsSpec {
-    /// The points, visited in this order again and again \[rad\].
+    /// The points, visited in this order, repeatedly \[rad\].
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub through: Vec<Vec<f64>>,
-    /// The same as places of a link, world frame \[m\].
+    /// The points as places of a link, world frame \[m\].
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub through_m: Vec<[f64; 3]>,
     /// Points drawn at random from within a radius.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub within: Option<WithinSpec>,
-    /// What reaches the points of `through_m` and `within`, and how.
+    /// Link and orientation with which the points of `through_m` and `within` are reached.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reach: Option<ReachSpec>,
-    /// How often a list of points is gone through, back to the first; then the arm stays there. Without it
-    /// the cycle goes on to the end.
+    /// Number of cycles through a list of points, back to the first, where the arm then stays. By default the
+    /// cycle repeats to the end.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 1_000_000))]
     pub cycles: Option<u32>,
-    /// Highest velocity, as a share of each joint's limit.
+    /// Highest velocity, as a fraction of each joint's limit.
     #[schemars(range(min = 0.001, max = 1.0))]
     pub speed: f64,
     /// Highest acceleration \[rad/s²\].
@@ -51,10 +51,10 @@ pub struct PointsSpec {
     pub acceleration_rad_s2: f64,
     /// Shortest and longest rest at a point \[s\].
     pub rest_s: [f64; 2],
-    /// Random points lie within this share of each joint's range, about its middle.
+    /// Fraction of each joint's range, about its middle, from which random points are drawn.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub range: f64,
-    /// Random points keep every moving link's frame this high above the base \[m\].
+    /// Minimum height of every moving link's frame above the base at random points \[m\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min_height_m: Option<f64>,
 }
@@ -76,64 +76,64 @@ impl Default for PointsSpec {
     }
 }
 
-/// Random teaching points: places within a radius, evenly in the sphere. The way between two of them is
-/// straight for the joints, not for the link.
+/// Random points: places uniformly distributed in a sphere. The path between two of them is straight in the
+/// joints' positions, not for the link.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WithinSpec {
-    /// The radius \[m\].
+    /// Radius of the sphere \[m\].
     #[schemars(range(min = 0.0, max = 10.0))]
     pub radius_m: f64,
-    /// Its centre, world frame \[m\]; by default where the posture has the link.
+    /// Centre of the sphere, world frame \[m\]; by default the place of the link in the posture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub about_m: Option<[f64; 3]>,
-    /// How far the link is turned from the posture's orientation at most, about a random axis \[rad\].
+    /// Largest rotation of the link from the posture's orientation, about a random axis \[rad\].
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 3.1))]
     pub turn_rad: f64,
-    /// Draws so many points, and goes through them again and again; without it every point is a new one.
+    /// Number of points to draw and to visit repeatedly; by default every point is a new one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 10_000))]
     pub count: Option<u32>,
 }
 
-/// How a link reaches places.
+/// Link and orientation with which places are reached.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReachSpec {
     /// The link; by default the one that holds tools.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
-    /// The point of it that goes there, in its frame \[m\].
+    /// The point of the link that reaches the place, in its frame \[m\].
     pub point_m: [f64; 3],
-    /// The position that each point is sought from, and that gives the link its orientation \[rad\]; by
-    /// default the middle of each joint's range.
+    /// Joint positions from which the inverse kinematics starts, and which define the link's orientation \[rad\];
+    /// by default the middle of each joint's range.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub posture: Option<Vec<f64>>,
-    /// Whether the link may turn as it likes; an arm with fewer than six joints needs that.
+    /// Whether the link's orientation is free; required for an arm with fewer than six joints.
     pub any_orientation: bool,
 }
 
-/// A sum of sines with random coefficients, the same for each period. It begins and ends at rest.
+/// A sum of sines with random coefficients, identical in each period. It begins and ends at rest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FourierSpec {
     /// The period \[s\].
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub period_s: f64,
-    /// How many harmonics of it.
+    /// Number of harmonics of the period.
     #[schemars(range(min = 1, max = 50))]
     pub harmonics: u32,
-    /// Highest velocity, as a share of each joint's limit.
+    /// Highest velocity, as a fraction of each joint's limit.
     #[schemars(range(min = 0.001, max = 1.0))]
     pub speed: f64,
     /// Highest acceleration \[rad/s²\].
     #[schemars(range(min = 0.001, max = 1000.0))]
     pub acceleration_rad_s2: f64,
-    /// Share of each joint's range that it keeps within.
+    /// Fraction of each joint's range that the motion uses.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub range: f64,
-    /// The position it swings about \[rad\]; by default the middle of each joint's range.
+    /// Centre of the motion \[rad\]; by default the middle of each joint's range.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub about: Option<Vec<f64>>,
 }
@@ -160,7 +160,7 @@ pub struct RecordedMotionSpec {
     /// Its topic (`sensor_msgs/msg/JointState`).
     #[serde(default = "default_motion_topic")]
     pub topic: String,
-    /// Of a CSV table, which column is what; only times and positions are taken.
+    /// Mapping of the columns of a CSV table to quantities; only times and positions are used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub columns: Option<CsvMapping>,
 }

@@ -1,4 +1,4 @@
-//! What is concealed is drawn from a seed, can be seen, and is told in one place only.
+//! Concealed effects depend on the seed, are visible in the effort, and are reported only in `concealed.json`.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -7,7 +7,7 @@ use super::*;
 
 const POSE: &str = "motion: {points: {through: [[0.3, 0.6, 0.2, 1.1, -0.4, 0.7, 0.1]]}}";
 
-/// Says where the tool is at a position.
+/// Returns a function from joint positions to the pose of the tool.
 fn tool() -> impl FnMut(&[f64]) -> Isometry3<f64> {
     let (model, mut data) = (arm(), Data::new(&arm()));
     move |position| {
@@ -84,14 +84,14 @@ fn without_friction_the_tool_returns_and_the_elbow_keeps_its_posture() {
     let elbow = (0..N)
         .map(|j| (pushed[j] - first[j]).abs())
         .fold(0.0, f64::max);
-    assert!(elbow > 0.05, "the arm gives way: {elbow}");
+    assert!(elbow > 0.05, "the arm yields: {elbow}");
     assert!(away < 0.5 * elbow, "more than the tool: {away}");
     for j in 0..N {
         assert!((last[j] - first[j]).abs() < 5e-3, "joint {j}: {last:?}");
     }
 }
 
-/// How far the tool is behind a reference that moves, along its way \[s\].
+/// Returns the largest lag of the tool behind a moving reference \[s\].
 fn lag_s(damps: &str) -> f64 {
     let scenario = ideal(
         "duration_s: 6, motion: {points: {through: [[0.0, 0.6, 0, 1.1, 0, 0.7, 0], [1.2, 0.6, 0, 1.1, 0, 0.7, 0]], \

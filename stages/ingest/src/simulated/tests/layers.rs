@@ -1,4 +1,4 @@
-//! Every layer of physics: what is recorded is RNEA and the terms on the recorded motion.
+//! Every layer of physics: the recorded effort is that of RNEA and the terms on the recorded motion.
 
 use tauscope_dynamics::terms::{
     EFFECTS, Effect, MotionSample, Physics, PlaceKind, Simulated, TermSpec,
@@ -10,9 +10,9 @@ use super::*;
 
 const MOTION: &str = "duration_s: 6, motion: {fourier: {period_s: 3}}";
 
-/// Root mean square over joints and instants of what `terms` change, and of what the record differs from
-/// RNEA and the terms, which get the mean position and velocity of two readings and the acceleration
-/// between them.
+/// Returns two root mean squares over joints and instants: of the effort of the scenario's terms, and of the error of
+/// RNEA and the terms against the record. Both get the mean position and velocity of two readings, and the
+/// acceleration between them.
 fn suffered(scenario: &Scenario) -> (f64, f64) {
     let specs: Vec<TermSpec> = scenario.physics.clone();
     let (model, mut data) = (arm(), Data::new(&arm()));
@@ -41,7 +41,7 @@ fn suffered(scenario: &Scenario) -> (f64, f64) {
         let mut expected = rigid.clone();
         physics.act(&at, &mut expected);
         let effort = middle(&now.effort, &next.effort);
-        // As the recording begins the drives are still finding their efforts.
+        // Skip the transient of the drives at the start of the recording.
         if k < 1000 {
             continue;
         }
@@ -54,10 +54,10 @@ fn suffered(scenario: &Scenario) -> (f64, f64) {
     ((changed / count).sqrt(), (wrong / count).sqrt())
 }
 
-/// What differences between readings of 1 kHz leave over without any physics \[N m\].
+/// Error of finite differences between readings at 1 kHz, without any physics \[N m\].
 const DISCRETE_NM: f64 = 0.015;
 
-/// The term is felt, and all but this share of what is felt is what the term says.
+/// Checks that the term changes the effort, and explains all but a fraction `share` of the change.
 fn agrees(physics: &str, share: f64) {
     let (changed, wrong) = suffered(&ideal(MOTION, &format!("physics: [{physics}],")));
     assert!(changed > 0.05, "{physics} is not felt: {changed}");
@@ -70,14 +70,15 @@ fn agrees(physics: &str, share: f64) {
 const PAYLOAD: &str = "mass_kg: 1.2, com_x_m: 0.02, com_y_m: -0.03, com_z_m: 0.08, ixx_kgm2: 0.002, \
                        iyy_kgm2: 0.003, izz_kgm2: 0.001";
 
-/// What a drawn effect makes of the record that its term does not: of a joint split in two, and of any other.
+/// Largest fraction of its effort change that a drawn effect's term may leave unexplained, for a joint split in two.
 const SHARE_SPLIT: f64 = 0.6;
+/// Largest such fraction for all other effects.
 const SHARE: f64 = 0.1;
 
-/// Scenarios drawn for each effect.
+/// Number of scenarios drawn for each effect.
 const DRAWS: usize = 4;
 
-/// A scenario with an effect as it is concealed in others.
+/// Returns a scenario with an effect that is drawn like a concealed one.
 fn drawn(effect: &Effect, seed: usize) -> Scenario {
     let concealing = concealing(&format!("seed: {seed}, effects: [{}]", effect.name));
     let (open, _) = super::super::conceal::add(&concealing, &arm()).unwrap();
@@ -87,7 +88,7 @@ fn drawn(effect: &Effect, seed: usize) -> Scenario {
     }
 }
 
-/// A scenario with a term that only describes, which none draws.
+/// Returns a scenario with an effect that is never drawn.
 fn describing(effect: &Effect) -> Scenario {
     let physics = match effect.place {
         PlaceKind::Link => {
@@ -119,8 +120,8 @@ fn suffers(effect: &'static Effect) {
         assert!(!reason.is_empty(), "{}", effect.name);
         return;
     }
-    // Not every one that is drawn is felt in this motion: a limit may not be reached. The draws are judged
-    // together, for a joint whose two sides chatter is described worse than the next.
+    // Not every draw changes the effort in this motion: a limit may not be reached. The draws are pooled, since a
+    // joint whose two sides chatter is explained less well than others.
     let draws: Vec<(f64, f64)> = if effect.concealed.is_some() {
         (0..DRAWS)
             .map(|seed| suffered(&drawn(effect, seed)))

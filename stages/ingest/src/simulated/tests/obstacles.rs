@@ -1,4 +1,4 @@
-//! What the arm runs into, and who pushes it.
+//! Obstacles that the arm runs into, and pushes.
 
 #![allow(clippy::float_cmp, reason = "what is the same must be the same bits")]
 
@@ -12,7 +12,7 @@ const DOWN: &str = "motion: {points: {through_m: [[0.42, 0, 0.5], [0.42, 0, 0.26
                     speed: 0.15, reach: {posture: [0, 0.9, 0, 1.4, 0, 0.8, 0]}}}";
 const SOFT: &str = "controller: {impedance: {translational_n_per_m: 600}},";
 
-/// The readings, the events at the end, and where the tool was.
+/// Returns the readings, the events at the end, and the places of the tool.
 fn run(scenario: &Scenario) -> (Vec<Reading>, Vec<Event>, Vec<Vector3<f64>>) {
     let mut simulation = Simulation::new(scenario, &arm(), 0).unwrap();
     let readings: Vec<_> = std::iter::from_fn(|| simulation.next_reading().unwrap()).collect();

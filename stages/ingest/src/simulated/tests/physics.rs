@@ -1,4 +1,4 @@
-//! The arm moves as the equation of motion says.
+//! The arm moves according to the equation of motion.
 
 use tauscope_bus::MAX_JOINTS;
 use tauscope_dynamics::terms::TermSpec;
@@ -22,13 +22,13 @@ fn at_rest_the_motors_hold_gravity_within_friction() {
             assert!(reading.velocity[j].abs() < 1e-3, "joint {j}: {reading:?}");
         }
     }
-    // What is held is worth the name.
+    // The gravity effort is large enough for a meaningful test.
     let first = readings(&scenario)[0];
     assert!(first.effort[1] < -10.0, "{:?}", first.effort);
 }
 
-/// Largest difference of what was measured from RNEA + friction - torque of the push, by joint, over
-/// all instants; the acceleration is that of the next millisecond.
+/// Returns the largest difference of the measured effort from RNEA + friction - torque of the push, by joint,
+/// over all instants; the acceleration is that of the next millisecond.
 fn worst(readings: &[Reading], mut push: impl FnMut(&Reading) -> [f64; MAX_JOINTS]) -> [f64; N] {
     let (model, mut data) = (arm(), Data::new(&arm()));
     let mut worst = [0.0_f64; N];
@@ -45,7 +45,7 @@ fn worst(readings: &[Reading], mut push: impl FnMut(&Reading) -> [f64; MAX_JOINT
         let pushed = push(now);
         let effort = middle(now.effort, next.effort);
         for j in 0..N {
-            // Where the sign of friction changes within the millisecond, its mean is not known.
+            // The mean friction is unknown if its sign changes within the millisecond.
             if velocity[j].abs() < 0.01 {
                 continue;
             }
@@ -127,7 +127,7 @@ fn a_push_shows_as_minus_the_external_torque() {
     }
 }
 
-/// Drives that only give an effort.
+/// Returns a command of a constant effort without damping.
 fn constant(effort_nm: &[f64; N]) -> Drive<'_> {
     Drive {
         effort_nm,
@@ -199,7 +199,7 @@ fn friction_far_stiffer_than_the_step_neither_chatters_nor_swings_back() {
         );
     }
     for (j, velocity) in plant.velocity().iter().enumerate() {
-        // What holds gravity on a smoothed sign must creep a little.
+        // Friction with a smoothed sign holds gravity only with a slow creep.
         assert!(velocity.abs() < 4e-3, "joint {j}: {velocity}");
     }
 }

@@ -9,14 +9,14 @@ use super::*;
 
 const POSTURE: [f64; N] = [0.0, 0.6, 0.0, 1.2, 0.0, 0.9, 0.0];
 
-/// Where the tool is.
+/// Returns the pose of the tool.
 fn tool(position: &[f64]) -> Isometry3<f64> {
     let (model, mut data) = (arm(), Data::new(&arm()));
     forward_kinematics(&model, &mut data, &position[..N]);
     link_pose(&model, &data, model.tool_link())
 }
 
-/// Where the arm rests: commands that stay the same from one reading to the next but one.
+/// Returns the positions at which the arm rests: commands that are equal in two successive readings.
 fn stops(scenario: &Scenario) -> Vec<[f64; N]> {
     let readings = readings(scenario);
     let mut stops: Vec<[f64; N]> = Vec::new();

@@ -1,4 +1,4 @@
-//! What is published of the arm, and what cannot be simulated.
+//! Published values of the arm, and refused scenarios.
 
 use super::*;
 

@@ -8,10 +8,10 @@ use super::{JointRange, Target, quintic};
 use crate::simulated::error::ScenarioError;
 use crate::simulated::scenario::FourierSpec;
 
-/// Instants of a period at which limits are checked.
+/// Number of instants per period at which the limits are checked.
 /// Resolution: of a period; at most 50 harmonics leave 20 instants for the fastest.
 const STEPS_PER_PERIOD: f64 = 1000.0;
-/// The swing is blended in and out within this time, so that the arm begins and ends at rest \[s\].
+/// Duration of the blend at either end, so that the arm begins and ends at rest \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const BLEND_S: f64 = 2.0;
 
@@ -19,7 +19,7 @@ const BLEND_S: f64 = 2.0;
 #[derive(Debug)]
 pub(in crate::simulated) struct Fourier {
     about: JointArray,
-    /// By harmonic: coefficient of the sine and of the cosine, by joint.
+    /// Coefficients of the sine and of the cosine of each harmonic, by joint.
     waves: Vec<(JointArray, JointArray)>,
     omega: f64,
     joint_count: usize,
@@ -28,7 +28,7 @@ pub(in crate::simulated) struct Fourier {
 }
 
 impl Fourier {
-    /// A swing of `duration_s` with random coefficients, as large as the limits allow.
+    /// Creates a motion of `duration_s` with random coefficients, as large as the limits allow.
     pub fn new(
         spec: &FourierSpec,
         joints: &[JointRange],
@@ -46,7 +46,7 @@ impl Fourier {
         let omega = std::f64::consts::TAU / spec.period_s;
         let waves = (1..=spec.harmonics)
             .map(|k| {
-                // Equal shares of velocity for each harmonic.
+                // Equal velocity amplitudes for all harmonics.
                 let scale = 1.0 / f64::from(k);
                 let mut draw = || {
                     let mut wave = [0.0; MAX_JOINTS];
@@ -70,10 +70,10 @@ impl Fourier {
         Ok(fourier)
     }
 
-    /// Scales each joint's swing to its limits: all of it is linear in the coefficients.
+    /// Scales each joint's motion to its limits; position, velocity and acceleration are linear in the coefficients.
     fn scale(&mut self, spec: &FourierSpec, joints: &[JointRange]) {
         let mut peaks = [[0.0_f64; MAX_JOINTS]; 3];
-        // A period with the blend before it and one with the blend after it show all there is.
+        // All extremes occur within the blend and one period at either end.
         let window_s = (self.blend_s + spec.period_s).min(self.duration_s);
         let step_s = spec.period_s / STEPS_PER_PERIOD;
         for i in 0..=(window_s / step_s).ceil() as usize {
@@ -95,7 +95,7 @@ impl Fourier {
             let factor = (room / position)
                 .min(spec.speed * joint.velocity / velocity)
                 .min(spec.acceleration_rad_s2 / acceleration);
-            // The peak may lie between two instants of the grid.
+            // Margin of 1 %, since the peak may lie between two instants of the grid.
             let factor = if factor.is_finite() {
                 0.99 * factor
             } else {
@@ -108,7 +108,7 @@ impl Fourier {
         }
     }
 
-    /// Position, velocity and acceleration of the sum of sines alone.
+    /// Returns position, velocity and acceleration of the sum of sines alone.
     fn swing(&self, t_s: f64) -> [JointArray; 3] {
         let mut swing = [[0.0; MAX_JOINTS]; 3];
         for (k, (sine, cosine)) in self.waves.iter().enumerate() {

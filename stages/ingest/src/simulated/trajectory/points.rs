@@ -1,4 +1,4 @@
-//! From point to point along quintic polynomials, with rests.
+//! Motion from point to point along quintic polynomials, with rests.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -11,17 +11,17 @@ use crate::simulated::check;
 use crate::simulated::error::ScenarioError;
 use crate::simulated::scenario::PointsSpec;
 
-/// Time goes on even if the points are the same and there is no rest \[s\].
+/// Minimum duration of a move and its rest, needed if the points coincide and there is no rest \[s\].
 /// Resolution: far below any motion; only keeps the time increasing.
 const STILL_S: f64 = 1e-3;
 
-/// The motion; points are drawn as they are needed, so it can go on for ever.
+/// The motion. Points are drawn on demand, so its duration is not limited.
 pub(in crate::simulated) struct Points {
     spec: PointsSpec,
     joints: Vec<JointRange>,
     teach: Teach,
     rng: ChaCha8Rng,
-    /// Moves that are still to be made; `None` for no end.
+    /// Number of remaining moves; `None` for no end.
     moves_left: Option<u64>,
     from: JointArray,
     to: JointArray,
@@ -39,7 +39,7 @@ impl std::fmt::Debug for Points {
 }
 
 impl Points {
-    /// Begins with a rest at the first point; `model` is with the tool.
+    /// Creates a motion that begins with a rest at the first point; `model` includes the tool.
     pub fn new(
         spec: &PointsSpec,
         model: &Model,
@@ -82,7 +82,7 @@ impl Points {
         Ok(points)
     }
 
-    /// Length of a cycle, if there is a list of points and the rests are all of one length \[s\].
+    /// Returns the length of a cycle, if there is a list of points and all rests have the same length \[s\].
     pub fn cycle_s(&self) -> Option<f64> {
         let [shortest, longest] = self.spec.rest_s;
         let list = self.teach.list().filter(|list| list.len() > 1)?;
@@ -134,7 +134,7 @@ impl Points {
         target
     }
 
-    /// Plans the move from where the last one ended, and the rest after it.
+    /// Plans the next move and the rest after it.
     fn go_on(&mut self) {
         self.from = self.to;
         self.start_s = self.end_s;
@@ -153,7 +153,7 @@ impl Points {
         self.end_s = self.start_s + (self.move_s + self.rest()).max(STILL_S);
     }
 
-    /// The shortest time for a way \[s\].
+    /// Returns the shortest duration of a move within the limits \[s\].
     fn move_s(&self, from: &JointArray, to: &JointArray) -> f64 {
         let mut move_s = 0.0_f64;
         for (j, joint) in self.joints.iter().enumerate() {

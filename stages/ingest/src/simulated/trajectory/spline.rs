@@ -1,4 +1,4 @@
-//! Through given rows along natural cubic splines.
+//! Motion through given rows along natural cubic splines.
 
 use tauscope_bus::{JointArray, MAX_JOINTS};
 
@@ -16,7 +16,7 @@ pub(in crate::simulated) struct Spline {
 }
 
 impl Spline {
-    /// Through at least one row, with times that increase.
+    /// Creates a motion through at least one row, with increasing times.
     pub fn new(times_s: Vec<f64>, positions: Vec<JointArray>, joint_count: usize) -> Self {
         let curvatures = natural_curvatures(&times_s, &positions, joint_count);
         Self {

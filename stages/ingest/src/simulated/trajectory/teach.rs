@@ -1,4 +1,4 @@
-//! Which points a motion goes to.
+//! Choice of the points of a motion.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::Rng;
@@ -14,17 +14,17 @@ use crate::simulated::inverse::{Goal, Inverse};
 use crate::simulated::link_point::LinkPoint;
 use crate::simulated::scenario::{PointsSpec, ReachSpec, WithinSpec};
 
-/// Random points of the joints' ranges that are tried before it is given up.
+/// Maximum number of random points of the joints' ranges that are tried.
 /// Resolution: bounds the computing time; a motion that is not found by then is an error.
 const TRIES: usize = 1000;
-/// Random places that are tried before it is given up. Each needs an inverse kinematics.
+/// Maximum number of random places that are tried. Each needs an inverse kinematics.
 /// Resolution: bounds the computing time; a place that is not found by then is an error.
 const PLACE_TRIES: usize = 200;
 
-/// Says whether the arm may stand at a point.
+/// Predicate that tests whether the arm may be at a point.
 pub(in crate::simulated) type Allowed = Box<dyn FnMut(&[f64]) -> bool + Send>;
 
-/// The points of a motion, one after the other.
+/// Sequence of the points of a motion.
 pub(super) struct Teach {
     joints: Vec<JointRange>,
     allowed: Allowed,
@@ -32,14 +32,14 @@ pub(super) struct Teach {
 }
 
 enum Points {
-    /// A list, again and again.
+    /// A list, visited repeatedly.
     List {
         points: Vec<JointArray>,
         next: usize,
     },
-    /// Ever new ones within this share of the joints' ranges.
+    /// New random points within this fraction of the joints' ranges.
     Range(f64),
-    /// Ever new ones within a radius.
+    /// New random places within a radius.
     Within(Box<Within>),
 }
 
@@ -50,7 +50,7 @@ struct Within {
     turn_rad: f64,
     any_orientation: bool,
     centre: Isometry3<f64>,
-    /// Positions that reach the centre.
+    /// Joint positions that reach the centre.
     start: JointArray,
 }
 
@@ -102,7 +102,7 @@ impl Teach {
         Ok(teach)
     }
 
-    /// The points, if they are a list.
+    /// Returns the points, if they are a list.
     pub fn list(&self) -> Option<&[JointArray]> {
         match &self.points {
             Points::List { points, .. } => Some(points),
@@ -110,7 +110,7 @@ impl Teach {
         }
     }
 
-    /// The next point; `None` if there is none that is allowed.
+    /// Returns the next point; `None` if no allowed point is found.
     pub fn next(&mut self, rng: &mut ChaCha8Rng) -> Option<JointArray> {
         let n = self.joints.len();
         match &mut self.points {
@@ -134,7 +134,7 @@ impl Teach {
         }
     }
 
-    /// Why there is no next one.
+    /// Returns the error for a next point that is not found.
     pub fn no_point(&self, spec: &PointsSpec) -> ScenarioError {
         let min_height_m = spec.min_height_m.unwrap_or(0.0);
         match &self.points {
@@ -193,7 +193,7 @@ impl Within {
         })
     }
 
-    /// A point at random, if it can be reached.
+    /// Draws a random point; returns `None` if it cannot be reached.
     fn draw(&mut self, rng: &mut ChaCha8Rng) -> Option<JointArray> {
         let offset: [f64; 3] = UnitBall.sample(rng);
         let axis: [f64; 3] = UnitSphere.sample(rng);
@@ -227,7 +227,7 @@ fn joint_points(
     through.iter().map(point).collect()
 }
 
-/// Each place, sought from where the one before was found.
+/// Returns joint positions for each place, searched from those of the previous place.
 fn places(
     through_m: &[[f64; 3]],
     reach: &ReachSpec,
@@ -257,7 +257,7 @@ fn goal(pose: &Isometry3<f64>, reach: &ReachSpec) -> Goal {
     }
 }
 
-/// The arm with the point that is to go somewhere, and its posture.
+/// Returns the inverse kinematics of the configured point, and the posture from which it starts.
 fn inverse(
     reach: &ReachSpec,
     model: &Model,

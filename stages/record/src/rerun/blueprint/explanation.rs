@@ -1,4 +1,4 @@
-//! How an explanation opens: the verdict on the left, and below it what happened in time; on the right a tab a
+//! Initial layout of an explanation: on the left the verdict above the log of events; on the right a tab per
 //! recording with effort and residual of each joint.
 
 use rerun::ApplicationId;
@@ -18,7 +18,7 @@ use crate::rerun::explanation::{
 };
 use crate::rerun::robot::Robot;
 
-/// The layout's messages.
+/// Returns the messages of the layout.
 pub(in crate::rerun) fn messages(
     explanation: &Explanation,
     robot: Option<&Robot>,
@@ -56,7 +56,7 @@ pub(in crate::rerun) fn messages(
     properties.messages(&blueprint, application, BlueprintActivation::default())
 }
 
-/// The robot, below it the text, and the log of what happened if anything did.
+/// The robot, the text below it, and the log of events if there are any.
 fn left(
     explanation: &Explanation,
     robot: Option<&Robot>,
@@ -98,7 +98,7 @@ fn left(
     Vertical::new(views).with_row_shares(shares).into()
 }
 
-/// A recording: a row a joint, and a band for what happened.
+/// Tab of a recording: a row per joint, and a band of events.
 fn tab(
     explanation: &Explanation,
     recording: &ExplainedRecording,

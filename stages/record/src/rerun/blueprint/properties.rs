@@ -1,5 +1,5 @@
-//! Settings of views for which Rerun's layout types have no methods yet in Rust: logged beside them
-//! into the same blueprint, as its Python package does.
+//! View settings for which Rerun's layout types have no Rust methods yet. They are logged into the same blueprint, as
+//! Rerun's Python package does.
 
 use rerun::blueprint::{Blueprint, BlueprintActivation, ContainerLike};
 use rerun::components::Range1D;
@@ -35,7 +35,7 @@ pub(super) struct Properties {
 }
 
 impl Properties {
-    /// From where a 3D view looks at what.
+    /// Sets eye and target of a 3D view.
     pub fn look_at(&mut self, view: &ContainerLike, point: ViewPoint) {
         self.set(
             view,
@@ -49,8 +49,8 @@ impl Properties {
         self.set(view, "Background", &background);
     }
 
-    /// A text log: how bad and what. When stands in the text: the viewer's own column shows the
-    /// beginning of the date.
+    /// Sets the columns of a text log: level and text. The time is part of the text, because the viewer's time column
+    /// shows only the beginning of the date.
     pub fn events(&mut self, view: &ContainerLike) {
         let when = Timestamps {
             visible: false.into(),
@@ -66,7 +66,7 @@ impl Properties {
         self.set(view, "TextLogColumns", &columns);
     }
 
-    /// A plot: all move along the time together; a `window_ns` shows only so much of the past.
+    /// Links the time axis of a plot to that of all others. `window_ns` limits the visible past.
     pub fn plot(&mut self, view: &ContainerLike, legend: bool, window_ns: Option<i64>) {
         self.set(
             view,
@@ -90,7 +90,7 @@ impl Properties {
         }
     }
 
-    /// What a plot shows of the values.
+    /// Sets the range of values of a plot.
     pub fn vertical_range(&mut self, view: &ContainerLike, low: f64, high: f64) {
         let range = ScalarAxis::new().with_range(Range1D::new(low, high));
         self.set(view, "ScalarAxis", &range);
@@ -105,7 +105,7 @@ impl Properties {
         }
     }
 
-    /// The blueprint's messages with the settings among them.
+    /// Returns the messages of the blueprint, including the settings.
     pub fn messages(
         self,
         blueprint: &Blueprint,

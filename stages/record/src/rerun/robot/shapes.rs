@@ -1,5 +1,5 @@
-//! What each link looks like: its simple shapes from the URDF; a skeleton where there are only
-//! meshes, which are files that need not be at hand.
+//! Shapes of the links: the primitive shapes of the URDF, or a skeleton for links with meshes only, whose files may
+//! be missing.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use rerun::archetypes::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D};
@@ -11,13 +11,13 @@ use tauscope_dynamics::{Data, Geometry, Model, forward_kinematics, link_pose};
 use crate::error::RecordError;
 use crate::rerun::store::{Out, Store};
 
-/// Radius of a skeleton's bones, as a part of the robot's length.
+/// Radius of a skeleton's bones, relative to the robot's length.
 /// Tuned: by eye, for the picture; no number depends on it.
 const BONE_RADIUS: f64 = 0.03;
-/// Radius of the drum at each joint, as a part of the bones' radius.
+/// Radius of the drum at each joint, relative to the bones' radius.
 /// Tuned: by eye, for the picture; no number depends on it.
 const DRUM_RADIUS: f32 = 1.25;
-/// Length of the drum at each joint, as a part of the bones' radius.
+/// Length of the drum at each joint, relative to the bones' radius.
 /// Tuned: by eye, for the picture; no number depends on it.
 const DRUM_LENGTH: f32 = 3.6;
 
@@ -25,11 +25,11 @@ const DRUM_LENGTH: f32 = 3.6;
 #[derive(Debug, Default, Clone, PartialEq)]
 pub(super) struct Shapes {
     boxes: Vec<([f32; 3], Pose)>,
-    /// Length, radius; along z, about the pose.
+    /// Length, radius and pose; along z, centred at the pose.
     cylinders: Vec<(f32, f32, Pose)>,
-    /// Radius.
+    /// Radius and pose.
     spheres: Vec<(f32, Pose)>,
-    /// Length, radius; from the pose along z.
+    /// Length, radius and pose; from the pose along z.
     bones: Vec<(f32, f32, Pose)>,
 }
 
@@ -43,7 +43,7 @@ pub(super) fn of(model: &Model) -> Vec<Shapes> {
         .iter()
         .map(|link| Shapes::simple(&link.shapes))
         .collect();
-    // A robot without any simple shape, or a link whose looks are a mesh, gets bones.
+    // Bones for a robot without primitive shapes, and for each link with meshes only.
     let bare = all.iter().all(Shapes::is_empty);
     let bony: Vec<_> = model
         .links()
@@ -120,7 +120,7 @@ impl Shapes {
         *self == Self::default()
     }
 
-    /// Draws them for all times.
+    /// Draws them as static data.
     pub fn draw(
         &self,
         entity: &EntityPath,
@@ -161,7 +161,7 @@ impl Shapes {
         Ok(())
     }
 
-    /// One colour a row for all of them.
+    /// Columns with one colour per row for all shapes.
     pub fn colour_columns(
         &self,
         colours: &[Rgba32],
@@ -199,7 +199,7 @@ fn to_pose(pose: &Isometry3<f64>) -> Pose {
 /// The pose at the origin whose z axis points along `bone`.
 fn along(bone: Vector3<f64>) -> Pose {
     let rotation = UnitQuaternion::rotation_between(&Vector3::z(), &bone)
-        // Straight down: any half turn about a level axis.
+        // Opposite direction: any half turn about a horizontal axis.
         .unwrap_or_else(|| {
             UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
         });

@@ -6,25 +6,26 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Real, number};
 
-/// β₁, how long the mean of the gradients remembers, as the paper suggests.
+/// β₁, decay rate of the mean of the gradients, as the paper suggests.
 const MEAN_DECAY: f64 = 0.9;
-/// β₂, how long the mean of their squares remembers.
+/// β₂, decay rate of the mean of their squares.
 const SQUARE_DECAY: f64 = 0.999;
-/// ε, which keeps the step finite.
+/// ε, which bounds the step.
 const FLOOR: f64 = 1e-8;
 
-/// A matrix that is learned.
+/// A learned matrix.
 pub(crate) struct Weight<T> {
-    /// Now.
+    /// Current value.
     pub value: DMatrix<T>,
-    /// What the loss gains with each entry of `value`; of the same shape.
+    /// Gradient of the loss by `value`, of the same shape.
     pub gradient: DMatrix<T>,
     /// The paper's m and v.
     moments: [DMatrix<T>; 2],
 }
 
 impl<T: Real> Weight<T> {
-    /// Drawn evenly from ±1/√`fan_in`, column by column: `PyTorch`'s start for dense and recurrent layers.
+    /// Draws a matrix uniformly from ±1/√`fan_in`, column by column: `PyTorch`'s initialisation of dense and
+    /// recurrent layers.
     pub fn start(rows: usize, columns: usize, fan_in: usize, rng: &mut ChaCha8Rng) -> Self {
         let bound = 1.0 / (fan_in as f32).sqrt();
         let mut draw = || number(f64::from(rng.random_range(-bound..bound)));
@@ -37,14 +38,14 @@ impl<T: Real> Weight<T> {
     }
 }
 
-/// The optimizer's state, but for the moments, which are with the weights.
+/// The optimizer's state, except for the moments, which are stored with the weights.
 pub(crate) struct Adam {
     step_size: f64,
     steps: i32,
 }
 
 impl Adam {
-    /// Before the first step; `step_size` is the paper's α.
+    /// Creates the optimizer; `step_size` is the paper's α.
     pub fn new(step_size: f64) -> Self {
         Self {
             step_size,
@@ -52,7 +53,7 @@ impl Adam {
         }
     }
 
-    /// A step down the gradients (algorithm 1).
+    /// Takes one step of gradient descent (algorithm 1).
     pub fn step<T: Real>(&mut self, weights: Vec<&mut Weight<T>>) {
         self.steps += 1;
         let unbiased = |decay: f64| number::<T>(1.0 / (1.0 - decay.powi(self.steps)));
@@ -79,7 +80,7 @@ mod tests {
 
     use super::*;
 
-    /// Algorithm 1 line by line, by hand, for one number.
+    /// Evaluates algorithm 1 line by line for one number.
     #[test]
     fn three_steps_are_those_of_the_papers_algorithm() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -99,7 +100,7 @@ mod tests {
         }
     }
 
-    /// Section 2.1: the first step is of the size α whatever the gradient's scale.
+    /// Checks section 2.1: the first step has the size α for any scale of the gradient.
     #[test]
     fn the_first_step_has_the_step_size_whatever_the_scale_of_the_gradient() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);

@@ -1,5 +1,5 @@
-//! Dense layers one after the other, `ReLU` and dropout behind each middle one, trained to give back
-//! their input.
+//! A sequence of dense layers, with `ReLU` and dropout after each hidden layer, trained to reconstruct its
+//! input.
 
 use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
@@ -15,15 +15,15 @@ pub(crate) struct DenseNet<T> {
     room: Room<T>,
 }
 
-/// What is computed of a batch; an example is a row.
+/// Intermediate results for a batch; a row is an example.
 struct Room<T> {
-    /// The input, then what each layer gives.
+    /// The input, then the output of each layer.
     units: Vec<DMatrix<T>>,
-    /// By how much each middle layer's unit grows with its sum: 0 below zero and for what is left out.
+    /// Derivative of each hidden unit by its sum: 0 for negative sums and dropped units.
     slopes: Vec<DMatrix<T>>,
-    /// The loss's gradient by the sums of each layer.
+    /// Gradient of the loss by the sums of each layer.
     gradients: Vec<DMatrix<T>>,
-    /// Each layer's input, an example a column.
+    /// Input of each layer, transposed: a column is an example.
     turned: Vec<DMatrix<T>>,
 }
 
@@ -46,7 +46,7 @@ impl<T: Real> Room<T> {
 }
 
 impl<T: Real> DenseNet<T> {
-    /// Layers between neighbours of `sizes`, before training. `sizes` holds at least two.
+    /// Creates untrained layers between neighbours of `sizes`. `sizes` has at least two elements.
     pub fn start(sizes: &[usize], dropout: f64, rng: &mut ChaCha8Rng) -> Self {
         let layers: Vec<_> = (sizes.windows(2))
             .map(|pair| Dense::start(pair[0], pair[1], rng))
@@ -58,7 +58,7 @@ impl<T: Real> DenseNet<T> {
         }
     }
 
-    /// Weight and bias of each layer, the weight by the output: a row each.
+    /// Returns weight and bias of each layer; the weight has one row per output.
     pub fn numbers(&self) -> impl Iterator<Item = [&[T]; 2]> {
         (self.layers.iter()).map(|layer| [&layer.weight, &layer.bias].map(|w| w.value.as_slice()))
     }
@@ -87,7 +87,7 @@ impl<T: Real> DenseNet<T> {
             let Some(slopes) = room.slopes.get_mut(index) else {
                 continue;
             };
-            // Drawn example by example.
+            // The random numbers are drawn example by example.
             for row in 0..slopes.nrows() {
                 for unit in 0..slopes.ncols() {
                     slopes[(row, unit)] = drop_out(self.dropout, rng);
@@ -129,7 +129,7 @@ impl<T: Real> DenseNet<T> {
         }
     }
 
-    /// What it gave for the last batch, an example a row.
+    /// Returns the output for the last batch; a row is an example.
     #[cfg(test)]
     pub fn output(&self) -> &DMatrix<T> {
         &self.room.units[self.layers.len()]
@@ -152,7 +152,7 @@ mod tests {
     use super::super::differences;
     use super::*;
 
-    /// Every gradient, with the same units left out each time.
+    /// Checks every gradient, with the same units dropped each time.
     #[test]
     fn its_gradients_are_the_differences_of_its_loss() {
         for (dropout, batch) in [(0.0, vec![0, 3, 1]), (0.3, vec![2, 0, 1, 3, 4, 4, 5, 6])] {

@@ -1,8 +1,9 @@
-//! Gradients held against central differences.
+//! Comparison of gradients with central differences.
 
 use super::Net;
 
-/// Every gradient of `net` is the central difference of `loss`, which computes the loss and sets the gradients.
+/// Checks that every gradient of `net` equals the central difference of `loss`, which computes the loss and sets the
+/// gradients.
 pub(super) fn check<N: Net<f64>>(net: &mut N, loss: impl Fn(&mut N) -> f64) {
     const STEP: f64 = 1e-6;
     loss(net);

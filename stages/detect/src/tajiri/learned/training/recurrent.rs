@@ -1,8 +1,8 @@
-//! One LSTM layer (Hochreiter and Schmidhuber, Long Short-Term Memory, 1997, with the forget gate of Gers,
-//! Schmidhuber and Cummins, Learning to Forget, 2000) and a dense layer behind it, trained by
+//! An LSTM layer (Hochreiter and Schmidhuber, Long Short-Term Memory, 1997, with the forget gate of Gers,
+//! Schmidhuber and Cummins, Learning to Forget, 2000) followed by a dense layer, trained by
 //! backpropagation through time (Goodfellow, Bengio and Courville, Deep Learning, section 10.2.2).
 //!
-//! With the sums s = Wx x(t) + Wh h(t-1) + b, of which each gate has a quarter, s₁ to s₄:
+//! The sums s = Wx x(t) + Wh h(t-1) + b consist of a quarter for each gate, s₁ to s₄:
 //!
 //! i = σ(s₁), f = σ(s₂), g = tanh(s₃), o = σ(s₄);  c(t) = f c(t-1) + i g;  h(t) = o tanh(c(t))
 
@@ -14,17 +14,17 @@ use super::adam::Weight;
 use super::dense::Dense;
 use super::{Net, Real, drop_out, number};
 
-/// One stretch of training data, scaled.
+/// One segment of scaled training data.
 pub(crate) struct Sequence<T> {
-    /// Sample after sample.
+    /// Inputs, concatenated over the samples.
     pub inputs: Vec<T>,
-    /// What is wanted, sample after sample.
+    /// Desired outputs, concatenated over the samples.
     pub outputs: Vec<T>,
-    /// Samples.
+    /// Number of samples.
     pub len: usize,
 }
 
-/// The net in training. Gates in the order input, forget, cell, output.
+/// The network in training, with gates in the order input, forget, cell, output.
 pub(crate) struct Recurrent<T> {
     /// Wx, `[4 hidden, inputs]`.
     weight_input: Weight<T>,
@@ -35,18 +35,18 @@ pub(crate) struct Recurrent<T> {
     output: Dense<T>,
     /// Whᵀ.
     weight_back: DMatrix<T>,
-    /// Samples of a sequence.
+    /// Number of samples in a sequence.
     length: usize,
     dropout: f64,
     room: Room<T>,
 }
 
-/// What is computed of a batch. But for the dense layer's, a column holds a sample: first those that begin
-/// the sequences of the batch, then the next of each.
+/// Intermediate results for a batch. A column is a sample, except for the dense layer. The first samples of all
+/// sequences in the batch come first, then all second samples, and so on.
 struct Room<T> {
     /// x.
     inputs: DMatrix<T>,
-    /// The sums, then the gates, then the loss's gradient by the sums.
+    /// The sums, then the gates, then the gradient of the loss by the sums.
     gates: DMatrix<T>,
     /// c.
     cells: DMatrix<T>,
@@ -54,19 +54,19 @@ struct Room<T> {
     bent: DMatrix<T>,
     /// h.
     hidden: DMatrix<T>,
-    /// The factors of dropout, then the loss's gradient by `hidden`.
+    /// The dropout factors, then the gradient of the loss by `hidden`.
     slopes: DMatrix<T>,
-    /// `hidden` after dropout, then the loss's gradient by it.
+    /// `hidden` after dropout, then the gradient of the loss by it.
     kept: DMatrix<T>,
-    /// The loss's gradient by c(t), from all that comes after t, one column a sequence.
+    /// Gradient of the loss by c(t) through all samples after t, one column per sequence.
     carried: DMatrix<T>,
-    /// x, a row a sample.
+    /// x, one row per sample.
     turned_inputs: DMatrix<T>,
-    /// `kept`, then `hidden`, a row a sample.
+    /// `kept`, then `hidden`, one row per sample.
     turned: DMatrix<T>,
-    /// What the dense layer gives, a row a sample.
+    /// Output of the dense layer, one row per sample.
     outputs: DMatrix<T>,
-    /// What was wanted, then the loss's gradient by `outputs`.
+    /// Desired outputs, then the gradient of the loss by `outputs`.
     wanted: DMatrix<T>,
 }
 
@@ -92,7 +92,8 @@ impl<T: Real> Room<T> {
 }
 
 impl<T: Real> Recurrent<T> {
-    /// With so many `inputs`, hidden units and outputs, before training on sequences of `length` samples.
+    /// Creates an untrained network with these numbers of inputs, hidden units and outputs, for sequences of `length`
+    /// samples.
     pub fn start(
         [inputs, hidden, outputs]: [usize; 3],
         length: usize,
@@ -111,7 +112,7 @@ impl<T: Real> Recurrent<T> {
         }
     }
 
-    /// Wx, Wh, b and the dense layer's W and b, each column by column of the shape that this file gives it.
+    /// Returns Wx, Wh, b and the dense layer's W and b, each in column-major order of its shape in this file.
     pub fn numbers(&self) -> [&[T]; 5] {
         let lstm = [&self.weight_input, &self.weight_hidden, &self.bias];
         let [input, hidden, bias] = lstm.map(|weight| weight.value.as_slice());
@@ -120,8 +121,8 @@ impl<T: Real> Recurrent<T> {
         [input, hidden, bias, weight, output_bias]
     }
 
-    /// An epoch's examples: disjoint sequences of `length` samples, which begin elsewhere every time. An example
-    /// is a place in `sequences` and the sample that it begins with.
+    /// Returns the examples of an epoch: disjoint sequences of `length` samples with a random start. An example is an
+    /// index into `sequences` and the index of its first sample.
     pub fn examples(
         sequences: &[Sequence<T>],
         length: usize,
@@ -148,7 +149,8 @@ impl<T: Real> Recurrent<T> {
         self.backward();
     }
 
-    /// What it gave for the last batch, a row a sample: those that begin the sequences, then the next of each.
+    /// Returns the output for the last batch, one row per sample: the first samples of all sequences, then all second
+    /// samples, and so on.
     #[cfg(test)]
     pub fn outputs(&self) -> &DMatrix<T> {
         &self.room.outputs
@@ -174,7 +176,7 @@ impl<T: Real> Recurrent<T> {
         }
     }
 
-    /// From a state of zeros.
+    /// Computes the outputs, starting from a zero state.
     fn forward(&mut self, rng: &mut ChaCha8Rng) {
         let room = &mut self.room;
         let batch = room.carried.ncols();
@@ -212,11 +214,11 @@ impl<T: Real> Recurrent<T> {
         let (one, zero) = (T::one(), T::zero());
         let output = &mut self.output;
         output.learn(&room.turned, &mut room.kept, &room.wanted);
-        // The gradient by h: what comes through the output,
+        // The gradient by h is the sum of the one through the output ...
         output.back(&room.wanted, &mut room.turned);
         room.turned.transpose_to(&mut room.kept);
         room.slopes.component_mul_assign(&room.kept);
-        // and what comes through the next sample's gates.
+        // ... and the one through the next sample's gates.
         let back = &mut self.weight_back;
         self.weight_hidden.value.transpose_to(back);
         room.carried.fill(zero);
@@ -232,7 +234,7 @@ impl<T: Real> Recurrent<T> {
         self.add_up();
     }
 
-    /// The gradients of the LSTM's weights, from those by the sums.
+    /// Computes the gradients of the LSTM's weights from those by the sums.
     fn add_up(&mut self) {
         let room = &mut self.room;
         let (one, zero) = (T::one(), T::zero());
@@ -253,7 +255,7 @@ impl<T: Real> Recurrent<T> {
 }
 
 impl<T: Real> Room<T> {
-    /// Gates, cells and h of a sample, from its sums and the cells `before`.
+    /// Computes gates, cells and h of a sample from its sums and the cells of the sample `before`.
     fn step(&mut self, sample: usize, before: Option<usize>) {
         let hidden = self.hidden.nrows();
         let gates = &mut self.gates.as_mut_slice()[sample * 4 * hidden..][..4 * hidden];
@@ -276,7 +278,7 @@ impl<T: Real> Room<T> {
         }
     }
 
-    /// The loss's gradient by a sample's sums, and by the cells `before` it.
+    /// Computes the gradient of the loss by a sample's sums, and by the cells of the sample `before`.
     fn step_back(&mut self, sample: usize, before: Option<usize>) {
         let hidden = self.hidden.nrows();
         let sequence = sample % self.carried.ncols();
@@ -317,7 +319,7 @@ mod tests {
     use super::super::differences;
     use super::*;
 
-    /// Two inputs, three outputs, two stretches.
+    /// Returns two sequences with two inputs and three outputs.
     fn sequences(rng: &mut ChaCha8Rng) -> Vec<Sequence<f64>> {
         [9, 8]
             .map(|len| {
@@ -332,7 +334,7 @@ mod tests {
             .into()
     }
 
-    /// Every gradient, through one sample and through several, with the same units left out each time.
+    /// Checks every gradient, through one sample and through several, with the same units dropped each time.
     #[test]
     fn its_gradients_are_the_differences_of_its_loss() {
         for (length, dropout) in [(1, 0.0), (6, 0.0), (6, 0.3)] {
