@@ -1,58 +1,56 @@
-//! A joint whose rotor and link are two masses: the encoder sits on the rotor, the link moves nearly,
-//! not quite, alike.
+//! A joint whose rotor and link are two masses: the encoder is on the rotor, and the link moves nearly like the
+//! rotor.
 //!
 //! Given the rotor's motion θ(t) as measured and that of the other joints, the link of joint j moves by
 //!
 //! M(q) q̈ + rest(q, q̇) = T,   with q = θ + δ,
 //!
-//! where M is the inertia that the joint moves (it does not depend on q itself), rest is the remaining
-//! effort of the rigid body, and T is what comes through the transmission as a function of δ and δ̇ (Spong,
-//! "Modeling and Control of Elastic Joint Robots", 1987, with the rotor's motion given). The state is δ, so
-//! nothing drifts: M δ̈ = T + F with F = -rest - M θ̈, which is taken to run straight between samples, and
-//! M to be the mean of both. The effort of the motor is J θ̈ + T, that of the other joints the rigid body's with the
-//! link's motion.
+//! where M is the inertia that the joint moves (it does not depend on q itself), rest is the remaining effort of the
+//! rigid body, and T is the torque of the transmission as a function of δ and δ̇ (Spong, "Modeling and Control of
+//! Elastic Joint Robots", 1987, with the rotor's motion given). The state is δ, so nothing drifts: M δ̈ = T + F with
+//! F = -rest - M θ̈. F is interpolated linearly between samples, and M is the mean of both. The effort of the motor
+//! is J θ̈ + T, that of the other joints the rigid body's with the link's motion.
 
 use std::sync::Arc;
 
 use super::{Expansion, MotionSample, Site};
 use crate::{Data, Model, rnea};
 
-/// The link is not followed further from its rotor than this \[rad\]: no transmission bears it.
-/// Physical: gears give way by hundredths of a radian.
+/// Largest deviation of the link from its rotor that is simulated \[rad\]: no transmission survives it.
+/// Physical: gears deflect by hundredths of a radian.
 const LARGEST_DEVIATION: f64 = 1.0;
 
-/// An inertia below this is none \[kg m²\].
+/// Smallest inertia that is not treated as zero \[kg m²\].
 /// Physical: far below the rotor of any robot; it only keeps a quotient finite.
 const LEAST_INERTIA: f64 = 1e-9;
 
-/// A second look at the end of a step changes nothing if the link is this near to where it was expected
-/// \[rad\].
+/// Error of the predicted link position below which a second iteration of a step changes nothing \[rad\].
 /// Physical: below the resolution of encoders, 1e-5 rad and more.
 const NEAR_ENOUGH: f64 = 1e-6;
 
-/// How far the link is from where the rotor has it, and how fast that changes.
+/// Deviation of the link from its position without compliance, and its rate.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Deviation {
-    /// \[rad\]
+    /// Deviation \[rad\].
     pub angle: f64,
-    /// \[rad/s\]
+    /// Rate \[rad/s\].
     pub rate: f64,
 }
 
-/// What is between rotor and link. Accelerations are those of the link: torque by the inertia that it
+/// Transmission between rotor and link. Accelerations are those of the link: torque divided by the inertia that it
 /// moves.
 pub(super) trait Transmission {
-    /// The deviation at rest under a steady forcing \[rad/s²\].
+    /// Deviation at rest under a constant forcing \[rad/s²\].
     fn settled(&self, inertia: f64, forcing: f64) -> Deviation;
 
-    /// The deviation `dt_s` later; the forcing runs straight from the first to the second value.
+    /// Deviation `dt_s` later; the forcing is linear from the first to the second value.
     fn advance(&self, inertia: f64, from: Deviation, forcing: [f64; 2], dt_s: f64) -> Deviation;
 
-    /// Acceleration of the link by what comes through \[rad/s²\].
+    /// Acceleration of the link by the transmitted torque \[rad/s²\].
     fn acceleration(&self, inertia: f64, at: Deviation) -> f64;
 }
 
-/// The link behind the transmission, followed along a motion.
+/// The link behind the transmission, simulated along a motion.
 #[derive(Debug)]
 pub(super) struct TwoMasses {
     joint: usize,
@@ -63,13 +61,13 @@ pub(super) struct TwoMasses {
     velocity: Vec<f64>,
     acceleration: Vec<f64>,
     before: Option<Before>,
-    /// Effort with the link where it was last asked for.
+    /// Effort for the last evaluated position of the link.
     link: Vec<f64>,
-    /// What bodies cost along the motion, where that is known, and the sample that comes next.
+    /// Expansion of the bodies' effort along the motion, if it was supplied, and index of the next sample.
     along: Option<(Arc<Expansion>, usize)>,
 }
 
-/// The sample before.
+/// State at the previous sample.
 #[derive(Debug, Clone, Copy)]
 struct Before {
     deviation: Deviation,
@@ -96,7 +94,7 @@ impl TwoMasses {
         }
     }
 
-    /// What bodies cost along the motion that is to come.
+    /// Supplies the expansion of the bodies' effort along the following motion.
     pub fn expand(&mut self, along: &Arc<Expansion>) {
         self.along = Some((Arc::clone(along), 0));
     }
@@ -105,7 +103,7 @@ impl TwoMasses {
         self.before = None;
     }
 
-    /// Adds what the motion costs more than without `transmission`; the rotor's own inertia not counted.
+    /// Adds the effort of the motion minus that without `transmission`; the rotor's own inertia is not included.
     pub fn act(
         &mut self,
         at: &MotionSample<'_>,
@@ -154,8 +152,8 @@ impl TwoMasses {
         }
     }
 
-    /// Where the link rests as the recording begins: looked for step by step, since what it bears
-    /// depends on where it is.
+    /// Position of the link at rest at the beginning of the recording, found by iteration, because its load depends
+    /// on its position.
     fn settle(
         &mut self,
         at: &MotionSample<'_>,
@@ -167,7 +165,7 @@ impl TwoMasses {
         for _ in 0..10 {
             let forcing = -rest / inertia - at.acceleration[self.joint];
             let next = limited(transmission.settled(inertia, forcing));
-            // Half way, so that a soft joint does not swing between two guesses.
+            // Half steps, so that the iteration of a soft joint does not oscillate.
             let step = 0.5 * (next.angle - deviation.angle);
             deviation.angle = if step.abs() < NEAR_ENOUGH {
                 next.angle
@@ -182,8 +180,8 @@ impl TwoMasses {
         (deviation, rest)
     }
 
-    /// Where the link is after `at.dt_s`, by a step with what it bore where it was and, if that is not
-    /// where it is, another with what it bears there.
+    /// Position of the link after `at.dt_s`: a step with the load at the previous position and, if the prediction was
+    /// wrong, a second step with the load at the new position.
     fn advance(
         &mut self,
         before: Before,
@@ -213,8 +211,8 @@ impl TwoMasses {
         (expected, rest)
     }
 
-    /// Effort of the rigid body at the joint with the link where `deviation` has it; that of all joints
-    /// is left in `link`.
+    /// Effort of the rigid body at the joint for this deviation of the link; the efforts of all joints are stored in
+    /// `link`.
     fn effort(&mut self, deviation: Deviation, at: &MotionSample<'_>, acceleration: f64) -> f64 {
         let j = self.joint;
         if let Some((along, k)) = &self.along {
@@ -236,7 +234,7 @@ impl TwoMasses {
     }
 }
 
-/// Keeps a link that tore off within bounds.
+/// Limits the deviation of a link that has torn off.
 fn limited(deviation: Deviation) -> Deviation {
     if deviation.angle.abs() <= LARGEST_DEVIATION {
         return deviation;
@@ -255,18 +253,27 @@ pub(super) struct Oscillator {
     frequency: f64,
     damping: f64,
     dt_s: f64,
-    /// How a deviation from the steady course and its rate carry over.
+    /// Transition matrix of a deviation from the steady state and its rate.
     angle: [f64; 2],
     rate: [f64; 2],
 }
 
 impl Oscillator {
-    /// For steps of `dt_s`; `frequency` ω in rad/s, `damping` ζ.
+    /// Creates the oscillator for steps of `dt_s`; `frequency` ω in rad/s, `damping` ζ.
+    ///
+    /// A mode above the Nyquist frequency keeps its static flexibility only (residual flexibility; Craig and Kurdila,
+    /// *Fundamentals of Structural Dynamics*, 2006, section 11.4). Samples do not determine its oscillation, and its alias
+    /// would be a resonance at a frequency that the joint does not have.
     pub fn new(frequency: f64, damping: f64, dt_s: f64) -> Self {
         let decay = frequency * damping;
         let swing = frequency * (1.0 - damping * damping).sqrt();
         let (sin, cos) = (swing * dt_s).sin_cos();
-        let left = (-decay * dt_s).exp();
+        let is_sampled = swing * dt_s < std::f64::consts::PI;
+        let left = if is_sampled {
+            (-decay * dt_s).exp()
+        } else {
+            0.0
+        };
         Self {
             frequency,
             damping,
@@ -279,7 +286,7 @@ impl Oscillator {
         }
     }
 
-    /// The state a step later; the forcing runs straight from the first to the second value.
+    /// The state one step later; the forcing is linear from the first to the second value.
     pub fn step(&self, from: Deviation, forcing: [f64; 2]) -> Deviation {
         let stiffness = self.frequency * self.frequency;
         let rate = (forcing[1] - forcing[0]) / self.dt_s / stiffness;
@@ -298,8 +305,8 @@ pub(super) mod tests {
     use super::super::tests::{TwoJoints, motion_with, sample};
     use super::*;
 
-    /// Effort of the first joint's motor along a motion, by small steps: `torque` is what comes through
-    /// at a deviation, for the inertia that the joint moves.
+    /// Effort of the first joint's motor along a motion, by small steps: `torque` is the transmitted torque at a
+    /// deviation, for the inertia that the joint moves.
     pub fn simulated(
         robot: &TwoJoints,
         samples: u32,
