@@ -1,7 +1,7 @@
 //! Nuisances: errors of bodies, laws and stamps that every real arm has and no report names.
 
 use tauscope_dynamics::Inertia;
-use tauscope_dynamics::terms::{EFFECTS, PlaceKind};
+use tauscope_dynamics::terms::{Coordinate, EFFECTS, Family, PlaceKind, words};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
@@ -150,7 +150,11 @@ fn of_bodies(problem: &Problem, fit: &Fit, scale: f64, all: &mut Vec<Nuisance>) 
             continue;
         };
         let units = fit.columns(problem, hypothesis, &[0.0; BODY]);
-        for parameters in usual_errors(&body) {
+        let unfound = usual_errors(&body)
+            .into_iter()
+            .zip(UNITS_OF_ERRORS)
+            .filter(|(_, unit)| !is_effect(fit, link, unit));
+        for (parameters, _) in unfound {
             let mut values = vec![0.0; problem.joints * problem.rows];
             for (unit, parameter) in units.factors.iter().zip(&parameters) {
                 for (value, unit) in values.iter_mut().zip(&unit.values) {
@@ -167,6 +171,21 @@ fn of_bodies(problem: &Problem, fit: &Fit, scale: f64, all: &mut Vec<Nuisance>) 
             });
         }
     }
+}
+
+/// Whether an effect of the fit is an error of a link's parameters of this unit: then its number is the whole error.
+fn is_effect(fit: &Fit, link: usize, unit: &str) -> bool {
+    let is_of_link = |active: &&Active| {
+        let effect = active.hypothesis.effect;
+        let is_body = effect.family == Family::Body && effect.place == PlaceKind::Link;
+        is_body && active.hypothesis.lasts() && active.hypothesis.place.link == link
+    };
+    let has_unit = |c: &Coordinate| words::unit(c.name).is_some_and(|(_, own)| own == unit);
+    let is_error = |active: &Active| {
+        let hypothesis = active.hypothesis;
+        hypothesis.is_unnamed_body() || hypothesis.effect.coordinates.iter().any(has_unit)
+    };
+    fit.actives.iter().filter(is_of_link).any(is_error)
 }
 
 /// Usual errors of another simulation's effort, whose bodies are not known: a share of each
@@ -201,6 +220,11 @@ fn of_another_simulation(problem: &Problem, all: &mut Vec<Nuisance>) {
         all.extend(columns.map(of));
     }
 }
+
+/// Units of the parameters that the usual errors of a body change: its mass, its centre of mass, its inertia.
+const UNITS_OF_ERRORS: [&str; BODY] = [
+    "kg", "m", "m", "m", "kg m²", "kg m²", "kg m²", "kg m²", "kg m²", "kg m²",
+];
 
 /// The usual errors of a body: changes of its ten inertial parameters, ten of them.
 fn usual_errors(body: &Inertia) -> Vec<[f64; BODY]> {
