@@ -99,8 +99,7 @@ pub fn write(
     // Remove the files of an earlier explanation: they would contradict the new report.
     let fixed = [REPORT, PAGE, TWIN, ROBOT, ROBOT_MJCF, PICTURE].map(|name| out.join(name));
     for path in fixed.into_iter().chain(motions(out)) {
-        // Errors are ignored: a missing file is fine, and a file that cannot be removed causes an error when it is
-        // written.
+        // A missing file is fine, and a file that cannot be removed causes an error when it is written.
         let _ = std::fs::remove_file(path);
     }
     let mut made = Made::default();

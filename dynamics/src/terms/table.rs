@@ -162,6 +162,7 @@ impl Table {
         } else {
             format!("joint {}'s", joints[self.of_joint])
         };
+        let which = format!("joint {}", joints[self.of_joint]);
         let against = match self.against {
             Against::Position => format!("{of} position"),
             Against::Velocity => format!("{of} velocity"),
@@ -171,24 +172,14 @@ impl Table {
             Against::Load if self.of_joint == joint => "its load".to_owned(),
             Against::Load => format!("{of} load"),
             Against::DrivenLoad => {
-                "its load, and on whether the joint drives the load or the load the joint"
-                    .to_owned()
+                "its load, and on whether the joint drives the load or is driven by it".to_owned()
             }
             Against::LoadTurned => {
                 "the change of its load since the load's last reversal (hysteresis)".to_owned()
             }
-            Against::SinceRest if self.of_joint == joint => {
-                "the time since the joint was last at rest".to_owned()
-            }
-            Against::SinceRest => format!(
-                "the time since joint {} was last at rest",
-                joints[self.of_joint]
-            ),
+            Against::SinceRest => format!("the time since {which} was last at rest"),
             Against::SinceTurn => {
-                format!(
-                    "the distance that joint {} has moved since its last reversal",
-                    joints[self.of_joint]
-                )
+                format!("the distance that {which} has moved since its last reversal")
             }
             Against::RecordingTime => "the time since the start of the recording".to_owned(),
             Against::SessionTime => "the time since the start of the session".to_owned(),
