@@ -347,3 +347,39 @@ pub fn mean_bodies(nuisances: &[Nuisance], means: &[f64]) -> Vec<Active> {
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use tauscope_dynamics::terms::effect;
+
+    use super::*;
+    use crate::fixture::problem_with;
+    use crate::inference::state::State;
+
+    /// Guards against a mass that came out short by what the usual error of the same link took.
+    #[test]
+    fn a_link_whose_mass_is_found_has_no_usual_error_of_its_mass() {
+        let problem = problem_with(3, |_, _, _| {});
+        let state = State::new(&problem, true);
+        let masses = |actives: Vec<Active>| {
+            let fit = Fit::new(&problem, actives);
+            let all = of(&problem, &fit, &state.sizes(&fit), true, [1.0, 1.0]);
+            let of_mass = |nuisance: &Nuisance| match nuisance.source {
+                Source::Body { link, parameters } if parameters[0] != 0.0 => Some(link),
+                _ => None,
+            };
+            all.iter().filter_map(of_mass).collect::<Vec<usize>>()
+        };
+        let [upper, lower] = masses(Vec::new())[..] else {
+            panic!("two links move")
+        };
+        let found = Hypothesis {
+            effect: effect("link_mass").unwrap(),
+            place: Whereabouts {
+                link: lower,
+                ..Whereabouts::default()
+            },
+        };
+        assert_eq!(masses(vec![found.with(vec![0.3])]), [upper]);
+    }
+}

@@ -23,16 +23,20 @@ pub fn tangents(problem: &Problem, fit: &Fit, efforts: &[Magnitude]) -> (Vec<Col
         .iter()
         .zip(&fit.actives)
     {
-        let factors = given.variant.factors_of(active);
-        let all = factors
-            .iter()
-            .zip(&given.variant.deviations)
-            .zip(&given.factors);
-        for ((factor, deviation), column) in all {
+        let mut add = |column: &Column, factor: f64| {
             let first = column.joint.map_or(0, |joint| joint * problem.rows);
             for (value, x) in measured.values[first..].iter_mut().zip(&column.values) {
                 *value += factor * x;
             }
+        };
+        if let Some(alone) = &given.alone {
+            add(alone, 1.0);
+            columns.push(alone.clone());
+        }
+        let factors = given.variant.factors_of(active).into_iter();
+        let all = factors.zip(&given.variant.deviations).zip(&given.factors);
+        for ((factor, deviation), column) in all {
+            add(column, factor);
             columns.push(column.times(*deviation));
         }
     }
@@ -62,7 +66,8 @@ impl<'a> Predictions<'a> {
         let lasts = given.iter().flat_map(|given| {
             let hypothesis = given.variant.hypothesis;
             let lasts = hypothesis.lasts() && !hypothesis.is_torque_scale();
-            given.factors.iter().map(move |_| lasts)
+            let count = usize::from(given.alone.is_some()) + given.factors.len();
+            std::iter::repeat_n(lasts, count)
         });
         Some(Self {
             lasts: lasts.collect(),
@@ -113,5 +118,38 @@ impl<'a> Predictions<'a> {
                 .collect()
         };
         (0..self.joints).map(of_joint).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use super::*;
+    use crate::fixture::{at_joint, problem_with};
+    use crate::inference::nuisance;
+    use crate::inference::state::State;
+
+    /// Guards against a delay that was refused as unpredictive because it has no linear coefficient.
+    #[test]
+    fn a_delay_predicts_what_is_left_out() {
+        let mut late: VecDeque<Vec<f64>> = VecDeque::new();
+        // Six samples of 10 ms.
+        let problem = problem_with(5, |_, _, effort| {
+            late.push_back(effort.to_vec());
+            if late.len() > 6
+                && let Some(then) = late.pop_front()
+            {
+                effort.copy_from_slice(&then);
+            }
+        });
+        let delay = at_joint("torque_delay", 0).with(vec![0.06]);
+        let fit = Fit::new(&problem, vec![delay]);
+        let state = State::new(&problem, true);
+        let sizes = state.sizes(&fit);
+        let nuisances = nuisance::of(&problem, &fit, &sizes, true, state.scales);
+        let space = state.space(&nuisances);
+        let predictions = Predictions::of(&problem, &space, &fit, &state.efforts).unwrap();
+        assert_eq!(predictions.unpredictive(&fit), Vec::<usize>::new());
     }
 }
