@@ -77,7 +77,7 @@ pub fn links(pipeline: &Pipeline) -> Vec<Link> {
 /// Returns the transport between two stages. Within a process, the sender calls the receiver directly, unless the
 /// receiver may skip samples or may wait for a disk or a network.
 fn over(maker: &Stage, listener: &Stage) -> Over {
-    let is_called = matches!(listener.role, Role::Twin | Role::Detect | Role::Explain)
+    let is_called = matches!(listener.role, Role::Twin | Role::Detect | Role::Watch)
         && listener.keep == Keep::All
         && !matches!(maker.role, Role::Outside(_));
     match (

@@ -51,6 +51,22 @@ fn limits_of_a_robot_that_leave_no_room_are_told() {
 }
 
 #[test]
+fn the_former_key_of_a_watch_is_accepted_with_the_edit() {
+    let folder = tempfile::tempdir().unwrap();
+    let watch = "- {name: guard, input: twin, explain: {}}\n";
+    let out = check(folder.path(), &stages(&format!("{GOOD}{watch}")), &[]);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+    let edit =
+        "warning: line 9: `explain` is the former key of a watch; in stage `guard` write `watch:`";
+    assert!(out.stderr.starts_with(edit), "{}", out.stderr);
+    let both = stages(&format!(
+        "{GOOD}{}",
+        watch.replace("explain: {}", "explain: {}, watch: {}")
+    ));
+    assert!(errors(&both).contains("watch"), "{}", errors(&both));
+}
+
+#[test]
 fn a_good_file_is_shown_as_tables_pictures_and_json() {
     let folder = tempfile::tempdir().unwrap();
     let out = check(folder.path(), &stages(GOOD), &[]);
@@ -69,7 +85,7 @@ fn a_good_file_is_shown_as_tables_pictures_and_json() {
     assert_eq!(
         rows,
         [
-            "|stage|is|cell|host|process|listens to|puts out|",
+            "|stage|kind|cell|host|process|listens to|puts out|",
             "|ingest|ingest|demo|this one|demo||joint states|",
             "|twin|twin|demo|this one|demo|ingest|twin states|",
             "|detect|detect|demo|this one|demo|twin|detections|",

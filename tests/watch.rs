@@ -1,4 +1,4 @@
-//! A watch in a pipeline: a step of friction in a simulated stream is named, in replay and live alike.
+//! Test of a residual watch in a pipeline: a friction step in a simulated stream is identified, in replay and live.
 
 #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
@@ -6,10 +6,10 @@ use std::path::Path;
 
 use crate::common::{Out, bundled, tauscope, write};
 
-/// When the friction steps in the recording \[s\].
+/// Time of the friction step in the recording \[s\].
 const STEP_S: f64 = 42.0;
 
-/// A recording in which the friction of joint 2 steps, and a pipeline that watches it with the URDF as it is.
+/// A recording in which the friction of joint 2 steps, and a pipeline that watches it with the unmodified URDF.
 fn set_up(folder: &Path) -> (std::path::PathBuf, std::path::PathBuf) {
     let robot = bundled().join("demo_arm.urdf");
     let scenario = format!(
@@ -45,7 +45,7 @@ cells: {{demo: {{robot: {robot}}}}}
 stages:
 - {{name: ingest, ingest: {{file: {{path: {recording}}}, rate: fast}}}}
 - {{name: twin, input: ingest, twin: {{}}}}
-- {{name: watch, input: twin, explain: {{}}}}
+- {{name: watch, input: twin, watch: {{}}}}
 - {{name: record, inputs: [ingest, twin, watch], record: {{mcap: run.mcap}}}}
 ",
         robot = robot.display(),

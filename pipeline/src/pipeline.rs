@@ -17,12 +17,15 @@ pub use file::{HostEntry, KeepEntry, PipelineFile, WakeEntry};
 pub use restart::{Restart, When};
 pub use role::{ROLE_KEYS, Role, words_for};
 
+use file::{StageEntry, stage_place};
+use role::FORMER_WATCH_KEY;
+
 use crate::cell::Cell;
 use crate::report::{Problem, Report};
 use crate::scenario::ScenarioFacts;
 use crate::settings::Settings;
 use crate::suggest;
-use crate::yaml;
+use crate::yaml::{self, Located};
 
 /// Poll interval of recorders and publishers for new samples \[ms\].
 /// Resolution: latency of the live picture, against wake-ups of the machine.
@@ -46,6 +49,8 @@ pub struct Pipeline {
     pub stages: Vec<Stage>,
     /// SHA-256 of the file that each twin's `model` names, by stage.
     pub model_sha256: BTreeMap<String, String>,
+    /// Edits that replace former keys of the file, which are still accepted.
+    pub former_keys: Vec<String>,
 }
 
 /// A stage with its inputs resolved.
@@ -154,6 +159,7 @@ impl Pipeline {
         }
         let text = file.text().to_owned();
         let model_sha256 = files.model_sha256;
+        let former_keys = former_keys(&file);
         Ok(Self {
             path: path.to_owned(),
             text,
@@ -161,8 +167,24 @@ impl Pipeline {
             hosts: file.value.hosts,
             stages,
             model_sha256,
+            former_keys,
         })
     }
+}
+
+/// Edits that replace former keys, each with its line.
+fn former_keys(file: &Located<PipelineFile>) -> Vec<String> {
+    let stages = file.value.stages.iter().enumerate();
+    let is_former = |(_, entry): &(usize, &StageEntry)| entry.explain.is_some();
+    let edit = |(index, entry): (usize, &StageEntry)| {
+        let key = file.key_span(&stage_place(index).key(FORMER_WATCH_KEY));
+        let line = file.text()[..key.start].matches('\n').count() + 1;
+        let name = &entry.name;
+        format!(
+            "line {line}: `{FORMER_WATCH_KEY}` is the former key of a watch; in stage `{name}` write `watch:` instead of `{FORMER_WATCH_KEY}:`"
+        )
+    };
+    stages.filter(is_former).map(edit).collect()
 }
 
 /// Default wake-up of a stage.

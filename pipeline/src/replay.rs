@@ -202,7 +202,7 @@ impl<'a> Replay<'a> {
                     Some(graph.stage(&stage.name, Box::new(detect), &input)?)
                 }
                 (
-                    Settings::Explain {
+                    Settings::Watch {
                         config,
                         model,
                         effort_cutoff_hz,
@@ -221,7 +221,7 @@ impl<'a> Replay<'a> {
                 (
                     Settings::Twin { .. }
                     | Settings::Detect { .. }
-                    | Settings::Explain { .. }
+                    | Settings::Watch { .. }
                     | Settings::Publish { .. }
                     | Settings::Outside(_),
                     _,

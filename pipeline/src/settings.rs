@@ -28,7 +28,7 @@ pub enum Settings {
         model: Option<TwinFile>,
     },
     /// A watch over a twin.
-    Explain {
+    Watch {
         /// Settings from the pipeline file.
         config: tauscope_watch::Config,
         /// The model of the twin it listens to.

@@ -221,7 +221,7 @@ fn every_stage_is_deterministic_allocates_nothing_and_gets_over_gaps_nan_rates_a
         match role {
             "twin" => keeps_its_promises(role, WARM, &|| twin(&cell), &<[JointState]>::to_vec),
             "detect" => detectors(&cell, &behind_twin),
-            "explain" => {
+            "watch" => {
                 let config = tauscope_watch::Config::default();
                 let make = || -> Box<dyn Stage<_, _>> {
                     Box::new(build::watch(&config, None, 20.0, &cell).unwrap())

@@ -142,7 +142,7 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
                 &cell()?.facts,
             )))
         }
-        Settings::Explain {
+        Settings::Watch {
             config,
             model,
             effort_cutoff_hz,

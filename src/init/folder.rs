@@ -256,7 +256,7 @@ SOURCE
   - name: watch
     input: twin
     # Reports a change of the arm if no contact explains an alarm: a payload, friction, a scale or an offset.
-    explain: {}
+    watch: {}
 
   - name: record
     inputs: [ingest, twin, detect, watch]

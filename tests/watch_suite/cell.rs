@@ -31,7 +31,7 @@ const RATES_HZ: [f64; 3] = [100.0, 500.0, 1000.0];
 pub enum Change {
     /// Additional friction at a joint \[N m\].
     Friction(usize, f64),
-    /// A factor at a joint.
+    /// Factor on the measured effort of a joint.
     Gain(usize, f64),
     /// Additional mass \[kg\].
     Payload(f64),
@@ -45,13 +45,13 @@ pub struct Cell {
     pub urdf: PathBuf,
     pub model: Model,
     pub rate_hz: f64,
-    /// White noise of the effort, as a share of each joint's limit.
+    /// Standard deviation of the effort's white noise, as a fraction of each joint's limit.
     noise: f64,
     payload_kg: Range<f64>,
 }
 
 impl Cell {
-    /// Robots and rates alternate.
+    /// Draws the cell of `seed`. Nine consecutive seeds cover all combinations of robot and rate.
     pub fn new(seed: u64) -> Self {
         let turn = seed as usize;
         let (file, payload_kg) = ROBOTS[turn % 3].clone();

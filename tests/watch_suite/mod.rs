@@ -51,7 +51,7 @@ impl Cell {
             "stages": [
                 {"name": "ingest", "ingest": {"file": {"path": recording}, "rate": "fast"}},
                 {"name": "twin", "input": "ingest", "twin": twin},
-                {"name": "watch", "input": "twin", "explain": {}},
+                {"name": "watch", "input": "twin", "watch": {}},
             ],
         });
         let pipeline = write(&folder.join("pipeline.yaml"), &pipeline.to_string());

@@ -15,16 +15,14 @@ use tauscope_twin::{Expected, Motion, TwinFile};
 
 use super::Purpose;
 use super::file::{PipelineFile, StageEntry, stage_place};
-use super::role::Role;
+use super::role::{FORMER_WATCH_KEY, Role};
 use super::wiring::Wiring;
-use crate::build;
 use crate::cell::{Cell, EffortUnit};
-use crate::learnt_state;
-use crate::provenance;
 use crate::report::Report;
 use crate::scenario::ScenarioFacts;
 use crate::settings::{OutsideEntry, Settings};
 use crate::yaml::{self, Located, Place};
+use crate::{build, learnt_state, provenance};
 
 /// Resolved settings and the content of the files that they name.
 pub struct Files {
@@ -124,8 +122,11 @@ impl<'a> Resolver<'a> {
         if let Some(config) = &entry.detect {
             return self.detect(index, &place.key("detect"), config);
         }
+        if let Some(config) = &entry.watch {
+            return self.watch(index, &place.key("watch"), config);
+        }
         if let Some(config) = &entry.explain {
-            return self.explain(index, &place.key("explain"), config);
+            return self.watch(index, &place.key(FORMER_WATCH_KEY), config);
         }
         if let Some(config) = &entry.record {
             return self.record(index, &place.key("record"), config);
@@ -339,7 +340,7 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    fn explain(
+    fn watch(
         &mut self,
         index: usize,
         place: &Place,
@@ -372,7 +373,7 @@ impl<'a> Resolver<'a> {
                 return None;
             }
         }
-        Some(Settings::Explain {
+        Some(Settings::Watch {
             config,
             model: model.cloned(),
             effort_cutoff_hz,

@@ -120,7 +120,7 @@ impl From<Endpoints> for Vec<String> {
     }
 }
 
-/// A stage: its name, its host and process, its inputs, and exactly one of `ingest`, `twin`, `detect`, `explain`,
+/// A stage: its name, its host and process, its inputs, and exactly one of `ingest`, `twin`, `detect`, `watch`,
 /// `record`, `publish` and `outside`, which defines its kind.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -164,6 +164,9 @@ pub struct StageEntry {
     #[serde(default)]
     pub detect: Option<tauscope_detect::Config>,
     /// A watch over a twin: reports when its residual changes, and which physical effect changed.
+    #[serde(default)]
+    pub watch: Option<tauscope_watch::Config>,
+    /// Former name of `watch`. `check` and `run` print the edit.
     #[serde(default)]
     pub explain: Option<tauscope_watch::Config>,
     /// A recorder of archives and pictures.

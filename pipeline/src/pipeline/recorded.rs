@@ -14,11 +14,11 @@ use crate::provenance::sha256;
 use crate::settings::Settings;
 
 impl Pipeline {
-    /// Warnings about valid but questionable settings of detectors (on `host`, if given), and about implausible
-    /// values of robots.
+    /// Warnings about former keys of the file, about valid but questionable settings of detectors (on `host`, if
+    /// given), and about implausible values of robots.
     pub fn warnings(&self, host: Option<&str>) -> Vec<String> {
         let here = |stage: &&Stage| host.is_none() || stage.host.as_deref() == host;
-        let mut warnings = Vec::new();
+        let mut warnings = self.former_keys.clone();
         for (name, cell) in &self.cells {
             let joints = cell.model.iter().flat_map(Model::joints);
             let remarks = joints.filter_map(Joint::remark);
@@ -68,7 +68,7 @@ impl Pipeline {
                     let detector = config.name();
                     detector.map(str::to_owned)
                 }
-                Settings::Explain { .. } => Some(watch::NAME.to_owned()),
+                Settings::Watch { .. } => Some(watch::NAME.to_owned()),
                 _ => None,
             };
             Some(StreamFacts {
@@ -76,7 +76,7 @@ impl Pipeline {
                 cell: maker.cells.first()?.clone(),
                 kind: maker.role.gives()?,
                 detector,
-                judges_contact: maker.role != Role::Explain,
+                judges_contact: maker.role != Role::Watch,
             })
         });
         facts.collect()

@@ -15,7 +15,7 @@ pub enum Role {
     /// A detector.
     Detect,
     /// A watch over a twin.
-    Explain,
+    Watch,
     /// A recorder.
     Record,
     /// A publisher.
@@ -39,8 +39,11 @@ pub enum Takes {
 
 /// Keys that define the kind of a stage.
 pub const ROLE_KEYS: [&str; 7] = [
-    "ingest", "twin", "detect", "explain", "record", "publish", "outside",
+    "ingest", "twin", "detect", "watch", "record", "publish", "outside",
 ];
+
+/// Former key of a watch, which is still accepted.
+pub const FORMER_WATCH_KEY: &str = "explain";
 
 impl Role {
     /// All kinds that `entry` declares, with their keys. A valid entry declares exactly one.
@@ -53,16 +56,18 @@ impl Role {
             entry.ingest.as_ref().map(|_| Self::Ingest),
             entry.twin.as_ref().map(|_| Self::Twin),
             entry.detect.as_ref().map(|_| Self::Detect),
-            entry.explain.as_ref().map(|_| Self::Explain),
+            entry.watch.as_ref().map(|_| Self::Watch),
             entry.record.as_ref().map(|_| Self::Record),
             entry.publish.as_ref().map(|_| Self::Publish),
             outside,
         ];
-        ROLE_KEYS
-            .into_iter()
-            .zip(claims)
-            .filter_map(|(key, role)| Some((key, role?)))
-            .collect()
+        let former = entry
+            .explain
+            .as_ref()
+            .map(|_| (FORMER_WATCH_KEY, Self::Watch));
+        let claims = ROLE_KEYS.into_iter().zip(claims);
+        let claims = claims.filter_map(|(key, role)| Some((key, role?)));
+        claims.chain(former).collect()
     }
 
     /// Key in the file.
@@ -71,7 +76,7 @@ impl Role {
             Self::Ingest => "ingest",
             Self::Twin => "twin",
             Self::Detect => "detect",
-            Self::Explain => "explain",
+            Self::Watch => "watch",
             Self::Record => "record",
             Self::Publish => "publish",
             Self::Outside(_) => "outside",
@@ -83,7 +88,7 @@ impl Role {
         match self {
             Self::Ingest => Takes::Nothing,
             Self::Twin => Takes::One(SampleKind::JointState),
-            Self::Detect | Self::Explain => Takes::One(SampleKind::TwinState),
+            Self::Detect | Self::Watch => Takes::One(SampleKind::TwinState),
             Self::Record | Self::Publish | Self::Outside(None) => Takes::Many,
             Self::Outside(Some(_)) => Takes::AnyOne,
         }
@@ -99,7 +104,7 @@ impl Role {
         match self {
             Self::Ingest => Some(SampleKind::JointState),
             Self::Twin => Some(SampleKind::TwinState),
-            Self::Detect | Self::Explain => Some(SampleKind::Detection),
+            Self::Detect | Self::Watch => Some(SampleKind::Detection),
             Self::Record | Self::Publish => None,
             Self::Outside(output) => output,
         }
@@ -111,7 +116,7 @@ pub fn makers_of(kind: SampleKind) -> &'static str {
     match kind {
         SampleKind::JointState => "an `ingest` stage",
         SampleKind::TwinState => "a `twin` stage",
-        SampleKind::Detection => "a `detect` or `explain` stage",
+        SampleKind::Detection => "a `detect` or `watch` stage",
         SampleKind::Health => "any stage",
     }
 }

@@ -24,7 +24,7 @@ impl Resolver<'_> {
             _ => Err(ConfigError::ManyCells),
         };
         let judges = |input: &usize| {
-            wiring.roles[*input] != Role::Explain
+            wiring.roles[*input] != Role::Watch
                 && wiring.roles[*input].gives() == Some(SampleKind::Detection)
         };
         let hears_detector = wiring.inputs[index].iter().any(judges);

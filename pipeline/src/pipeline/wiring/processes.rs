@@ -25,7 +25,7 @@ impl Checker<'_> {
         let joins = |role| {
             matches!(
                 role,
-                Some(Role::Ingest | Role::Twin | Role::Detect | Role::Explain)
+                Some(Role::Ingest | Role::Twin | Role::Detect | Role::Watch)
             )
         };
         let named: Vec<Option<String>> = (self.stages.iter().zip(roles).enumerate())
