@@ -109,6 +109,46 @@ fn every_link_to_a_file_or_a_heading_leads_there() {
     assert!(broken.is_empty(), "{}", broken.join("\n"));
 }
 
+/// Path below `docs/` and text of each page of the book: every Markdown file there but the summary.
+fn pages() -> Vec<(String, String)> {
+    let docs = root().join("docs");
+    let mut found: Vec<(String, String)> = texts()
+        .into_iter()
+        .filter_map(|(path, text)| {
+            let page = path.strip_prefix(&docs).ok()?.to_str()?.to_owned();
+            (page != "SUMMARY.md").then_some((page, text))
+        })
+        .collect();
+    found.sort();
+    found
+}
+
+#[test]
+fn the_summary_lists_every_page_once() {
+    let summary = std::fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
+    let mut listed: Vec<String> = summary
+        .split("](")
+        .skip(1)
+        .map(|rest| rest[..rest.find(')').unwrap()].to_owned())
+        .collect();
+    listed.sort();
+    let expected: Vec<String> = pages().into_iter().map(|(page, _)| page).collect();
+    assert_eq!(listed, expected);
+}
+
+#[test]
+fn every_page_begins_with_a_heading_and_a_sentence() {
+    for (page, text) in pages() {
+        let mut blocks = text.split("\n\n");
+        let heading = blocks.next().unwrap_or("");
+        let first = blocks.next().unwrap_or("");
+        let is_text = first.starts_with(|c: char| c.is_alphabetic() || c == '`');
+        let has_end = first.split_whitespace().any(|word| word.ends_with('.'));
+        assert!(heading.starts_with("# "), "{page}: {heading}");
+        assert!(is_text && has_end, "{page}: {first}");
+    }
+}
+
 /// The names of files in backticks.
 fn named_files(text: &str) -> impl Iterator<Item = &str> {
     text.split('`').skip(1).step_by(2).filter(|name| {
