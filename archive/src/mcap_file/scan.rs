@@ -1,4 +1,4 @@
-//! The layout of a file without a sound index, from reading all of it and checking the decompressed chunks.
+//! Layout of a file without a sound index, from a scan of the whole file that also checks the decompressed chunks.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -66,11 +66,14 @@ impl Scan<'_> {
                 return Ok(Some((record.at, DamageKind::Record { reason })));
             }
             match record.opcode {
+                // Only the summary follows, whose content the scan has already found in the data.
                 op::DATA_END | op::FOOTER => return Ok(None),
                 op::CHUNK => {
+                    // A run is a contiguous range of bytes, which must not contain a chunk.
                     self.plain.close(self.layout);
                     self.chunk(walk, record)?;
                 }
+                // The format forbids opcode 0. Other unknown opcodes are skipped, as it requires.
                 0 => {
                     let reason = "opcode 0".to_owned();
                     return Ok(Some((record.at, DamageKind::Record { reason })));
@@ -90,8 +93,9 @@ impl Scan<'_> {
 
     fn chunk(&mut self, walk: &mut Walk, record: Record) -> io::Result<()> {
         if record.len > MAX_LOADED_BYTES as u64 {
-            let reason = too_long(record.len);
-            self.broken_chunk(record, reason);
+            // The body is not read: that of the record before must not give its time.
+            self.body.clear();
+            self.broken_chunk(record, too_long(record.len));
             return Ok(());
         }
         walk.read(record.len as usize, &mut self.body)?;
