@@ -12,7 +12,7 @@ pub enum Exit {
     Done,
     /// Started, but not completed; the reason was reported when it occurred.
     Failed,
-    /// Done, but data was lost. The summary says which and how much.
+    /// Done, but data was lost. The summary reports which data and how much.
     Lossy,
     /// Wrong arguments or files: nothing was started, and the result gives the reason.
     Rejected,
@@ -42,7 +42,7 @@ pub enum Failure {
     Rejected(Report),
     /// An error during the work.
     Failed(anyhow::Error),
-    /// Ctrl-C or SIGTERM, with the progress at that time and the results that exist.
+    /// Ctrl-C or SIGTERM, with the progress at that time and the results written so far.
     Interrupted(String),
 }
 

@@ -1,12 +1,12 @@
 //! Ctrl-C and SIGTERM, for all commands but `run`, which ends its stages itself.
 //!
-//! A command that computes, and writes at its end, is terminated at once: a thread waits for the signal, removes
-//! unfinished files, reports the progress and exits with code 1. A command that must complete something, or that is
-//! writing, takes a [`Hold`]: the signal is then only noted, the command polls it ([`is_asked`]) between its steps,
-//! and reports its progress itself. A second signal terminates it in any case.
+//! A command that writes only at its end is terminated at once: a thread waits for the signal, removes unfinished
+//! files, reports the progress and exits with code 1. A command with a section that must be completed takes a
+//! [`Hold`]: the signal then only sets a flag, which the command polls between its steps ([`is_asked`]), and it
+//! reports its progress itself. A second signal terminates it in any case.
 //!
-//! A command whose files are only of use together has an [`Undo`]: its files are removed if the command fails or a
-//! signal terminates it.
+//! A command whose output files are useful only as a complete set creates an [`Undo`], which removes them if the
+//! command fails or a signal terminates it.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -18,11 +18,11 @@ use tokio::signal::unix::{SignalKind, signal};
 /// Exit code of work that was not completed.
 const EXIT_CODE: i32 = 1;
 
-/// Whether a signal has arrived.
+/// Whether a signal has arrived. It guards no other data, so `Relaxed` suffices.
 static ASKED: AtomicBool = AtomicBool::new(false);
 /// Progress of the work \[percent\]; above 100 if unknown.
 static PERCENT: AtomicU32 = AtomicU32::new(u32::MAX);
-/// Holds and current step. Locked while the program exits, so that no hold can begin.
+/// Holds and current step. Stays locked during the exit, so that no hold can begin any more.
 static STATE: Mutex<State> = Mutex::new(State {
     holds: 0,
     held: false,

@@ -38,7 +38,7 @@ pub(crate) struct Place {
 #[derive(Default)]
 pub(crate) struct Loaded {
     at: u64,
-    /// Decompressed records, or another buffer that [`Entry::body_at`] refers to.
+    /// Buffer with the message bodies, to which [`Entry::body_at`] refers.
     pub(crate) records: Vec<u8>,
     /// The selected messages, in file order until they are sorted by log time.
     pub(crate) messages: Vec<Entry>,
@@ -78,7 +78,7 @@ pub(crate) trait Chunks: Send {
 pub(crate) struct ChunkCursor<C> {
     chunks: C,
     order: Order,
-    /// Sorted in the order of loading.
+    /// Chunks in the order in which they are loaded.
     places: Vec<Place>,
     next_place: usize,
     loaded: Vec<Loaded>,
@@ -95,6 +95,7 @@ pub(crate) struct ChunkCursor<C> {
 impl<C: Chunks> ChunkCursor<C> {
     /// Creates a cursor over the chunks at `places`.
     pub(crate) fn new(chunks: C, order: Order, mut places: Vec<Place>) -> Self {
+        // `advance` loads a chunk as soon as its start time is reached, so the next one must have the earliest start.
         places.sort_by_key(|place| match order {
             Order::LogTime => (place.start_ns, place.at),
             Order::File => (0, place.at),

@@ -12,9 +12,9 @@ pub(crate) struct Packing {
     /// Name with article, e.g. `a Zstandard-compressed file`.
     pub(crate) words: &'static str,
     magic: &'static [u8],
-    /// Place of the magic \[bytes from the start of the file\].
+    /// File offset of the magic \[bytes\].
     magic_at: usize,
-    /// Endings of its files.
+    /// File name extensions.
     endings: &'static [&'static str],
     tool: Tool,
 }
@@ -22,13 +22,13 @@ pub(crate) struct Packing {
 /// Command line of the program that unpacks, with `IN` and `OUT` for the files.
 #[derive(Debug, PartialEq, Eq)]
 enum Tool {
-    /// Makes one file.
+    /// Decompresses to one file.
     OneFile(&'static str),
-    /// Makes the files that the archive lists.
+    /// Extracts the files in the archive.
     Archive(&'static str),
 }
 
-/// All of them. From: `magic(5)` of the program `file`, and the manual page of each tool.
+/// Recognised formats. From: `magic(5)` of the program `file`, and the manual page of each tool.
 const ALL: [Packing; 7] = [
     Packing {
         words: "a Zstandard-compressed file",
@@ -82,7 +82,7 @@ const ALL: [Packing; 7] = [
 ];
 
 impl Packing {
-    /// The format of a file that begins so.
+    /// Returns the format of a file with these first bytes, if it is recognised.
     pub(crate) fn of(beginning: &[u8]) -> Option<&'static Self> {
         let magic = |each: &&Self| {
             let from = beginning.get(each.magic_at..);
@@ -91,7 +91,7 @@ impl Packing {
         ALL.iter().find(magic)
     }
 
-    /// The shell command that unpacks the file at `path`.
+    /// Returns the shell command that unpacks the file at `path`.
     pub(crate) fn command(&self, path: &Path) -> String {
         let is_tar = |path: &Path| path.extension().is_some_and(|ending| ending == "tar");
         let unpacked = unpacked_path(path);
@@ -112,7 +112,7 @@ impl Packing {
     }
 }
 
-/// The path without the ending of a compressed file, e.g. `a.mcap` of `a.mcap.zstd`.
+/// Returns the path without the extension of a compressed file, e.g. `a.mcap` for `a.mcap.zstd`.
 pub(crate) fn unpacked_path(path: &Path) -> Option<PathBuf> {
     let ending = path.extension()?.to_str()?.to_lowercase();
     let known = ALL.iter().flat_map(|each| each.endings);
@@ -122,7 +122,7 @@ pub(crate) fn unpacked_path(path: &Path) -> Option<PathBuf> {
         .then(|| path.with_extension(""))
 }
 
-/// The path as one word of a shell.
+/// Returns the path quoted as one word of a shell command.
 fn quoted(path: &Path) -> String {
     let text = path.to_string_lossy();
     let plain = |letter: char| letter.is_alphanumeric() || "/._-+=:@%".contains(letter);

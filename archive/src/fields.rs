@@ -1,6 +1,6 @@
-//! Numbers and texts at the front of a slice of bytes.
+//! Parsing of little-endian numbers and length-prefixed strings.
 
-/// Takes little-endian fields off the front of a slice.
+/// Parser that takes little-endian fields off the front of a slice.
 pub(crate) struct Fields<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Fields<'a> {
@@ -10,7 +10,7 @@ impl<'a> Fields<'a> {
         Some(field)
     }
 
-    /// Bytes behind their length, a `u32`.
+    /// Takes a byte string, which is prefixed with its length as a `u32`.
     pub(crate) fn bytes(&mut self) -> Option<&'a [u8]> {
         let len = self.u32()? as usize;
         self.take(len)

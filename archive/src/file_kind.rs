@@ -8,11 +8,11 @@ use crate::compressed::Packing;
 use crate::ros1_bag;
 use crate::sqlite_file;
 
-/// Bytes that are examined.
+/// Number of examined bytes at the start of a file.
 /// Chosen: an XML file may have a licence as long before its first element.
 const BEGINNING: u64 = 16 << 10;
 
-/// The kind of the file at `path`, in words, if it is one of the files that people mix up.
+/// Returns the kind of the file at `path` as a noun phrase, if it is a kind that is often passed by mistake.
 pub fn file_kind(path: &Path) -> Option<&'static str> {
     if path.is_dir() {
         return Some("a folder");
@@ -20,7 +20,7 @@ pub fn file_kind(path: &Path) -> Option<&'static str> {
     kind_of(&beginning(path).ok()?)
 }
 
-/// The format of the file at `path`, if it is compressed or an archive of files.
+/// Returns the format of the file at `path`, if it is compressed or an archive of files.
 pub(crate) fn packing(path: &Path) -> Option<&'static Packing> {
     Packing::of(&beginning(path).ok()?)
 }
@@ -32,7 +32,7 @@ fn beginning(path: &Path) -> std::io::Result<Vec<u8>> {
     Ok(beginning)
 }
 
-/// The kind of a file that begins so.
+/// Returns the kind of a file with these first bytes.
 fn kind_of(beginning: &[u8]) -> Option<&'static str> {
     let known: [(&[u8], &str); 5] = [
         (mcap::MAGIC, "an MCAP recording"),
@@ -53,7 +53,7 @@ fn kind_of(beginning: &[u8]) -> Option<&'static str> {
     found.or_else(packing).or_else(|| kind_of_xml(beginning))
 }
 
-/// The kind of an XML file by its first element.
+/// Returns the kind of an XML file by its first element.
 fn kind_of_xml(beginning: &[u8]) -> Option<&'static str> {
     /// Byte order mark of UTF-8, which some editors write.
     const MARK: &[u8] = b"\xef\xbb\xbf";
@@ -62,7 +62,7 @@ fn kind_of_xml(beginning: &[u8]) -> Option<&'static str> {
     if !rest.starts_with('<') {
         return None;
     }
-    // Declarations and comments before the first element.
+    // Skips declarations and comments before the first element.
     while rest.starts_with("<?") || rest.starts_with("<!") {
         let end = if rest.starts_with("<!--") { "-->" } else { ">" };
         rest = rest.split_once(end)?.1.trim_start();

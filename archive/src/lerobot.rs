@@ -39,9 +39,9 @@ const EPISODE_INDEX: &str = "episode_index";
 /// Farthest plausible position of a revolute joint: two turns \[rad\].
 /// Physical: cables limit the turns of a joint; an axis that turns without limit is not a joint of an arm.
 const BEYOND: f64 = 4.0 * std::f64::consts::PI;
-/// Inverse of the fraction of joints beyond [`BEYOND`] at which positions are classified as degrees. A single gripper
-/// in percent is below this fraction.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Inverse of the fraction of joints beyond [`BEYOND`] at which positions are classified as degrees.
+/// Chosen: one gripper in percent among four or more joints stays below; in degrees, most joints of a motion are
+/// beyond.
 const SHARE_BEYOND: usize = 3;
 
 /// An episode whose rows have been checked.

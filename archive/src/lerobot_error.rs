@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Maximum number of features in an error message.
-/// Tuned: by eye, for the length of the message.
+/// Layout: by eye; no number depends on it.
 const SHOWN: usize = 12;
 
 /// An error in a LeRobot data set, with its path.

@@ -1,8 +1,8 @@
 //! Reading MCAP files (<https://mcap.dev/spec>) chunk by chunk.
 //!
-//! [`Layout::read`] finds the contents of the file from the index at its end if that is sound, and otherwise by
-//! reading all of it. [`mcap_cursor`] then loads chunks as they are needed and returns their messages in the order of
-//! log time. Only the index and the chunks that overlap the current log time are in memory.
+//! [`Layout::read`] determines the contents of the file from the index at its end, or from a scan of the whole file
+//! if the index is missing or damaged. [`mcap_cursor`] then loads chunks as they are needed and returns their
+//! messages in the order of log time. Only the index and the chunks that overlap the current log time are in memory.
 
 mod attachment;
 mod chunk;
@@ -18,7 +18,7 @@ pub(crate) use cursor::mcap_cursor;
 pub(crate) use index::{CRC_FROM_END_BYTES, read_footer, summary_crc};
 pub(crate) use layout::Layout;
 
-/// Longest record other than a chunk or an attachment that is read \[bytes\].
+/// Maximum length of a record other than a chunk or an attachment \[bytes\].
 /// Resolution: bounds memory.
 const MAX_RECORD_BYTES: u64 = 64 << 20;
 /// Opcode and length before each record \[bytes\].

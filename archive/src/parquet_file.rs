@@ -1,11 +1,11 @@
-//! Columns of numbers out of a Parquet file (<https://parquet.apache.org/docs/file-format/>), row by row.
+//! Reader of numeric columns of a Parquet file (<https://parquet.apache.org/docs/file-format/>), row by row.
 //!
 //! Supported are numbers and lists of numbers, plain or by dictionary, in pages of version 1 and 2, uncompressed or
 //! compressed with Snappy or Zstandard. pyarrow, pandas, Hugging Face `datasets` and Polars write this by default.
-//! Everything else is rejected with its name.
+//! Any other type, encoding or compression is rejected with an error that names it.
 //!
 //! Files are not trusted. A declared size is checked against the file and a limit before memory is allocated. Only
-//! one page of a column and its dictionary are held.
+//! one page per column and its dictionary are in memory.
 
 mod error;
 mod footer;
@@ -28,10 +28,10 @@ pub(crate) use rows::Rows;
 pub(crate) const MAGIC: &[u8] = b"PAR1";
 /// First bytes of a file that Git LFS has not fetched: `version https://git-lfs.github.com/spec/v1`.
 const LFS_POINTER: [u8; 4] = *b"vers";
-/// Longest footer that is read \[bytes\].
+/// Maximum size of the footer \[bytes\].
 /// Resolution: bounds memory; a thousand row groups of 300 columns have 45 MB.
 const MAX_FOOTER_BYTES: u64 = 64 << 20;
-/// The length of the footer and the magic, at the end of the file \[bytes\].
+/// Size of the footer's length and the magic at the end of the file \[bytes\].
 const TAIL_BYTES: u64 = 8;
 
 /// An open file with the selected columns.

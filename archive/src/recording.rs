@@ -71,7 +71,7 @@ impl std::fmt::Display for RecordingKind {
     }
 }
 
-/// An open recording. Its contents are known, its messages are not read yet.
+/// An open recording. Its topics and times are known; its messages have not been read.
 pub struct Recording {
     path: PathBuf,
     kind: RecordingKind,

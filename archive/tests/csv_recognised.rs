@@ -173,7 +173,7 @@ fn degrees_are_converted_where_all_say_so() {
         "t,a.position [turns],a.effort [mNm],b.position [turns],b.effort [mNm]\n0,1,5,1,5\n1e-3,1,5,1,5\n",
     );
     assert!((opened.rows[0].1[2] - 0.005).abs() < 1e-12);
-    opened.says("Positions are headed [turns], which is no unit that is known.");
+    opened.says("Positions are headed [turns], an unknown unit, and are not converted.");
     opened.says("Efforts are headed [mN m] and are converted to N m.");
 }
 
@@ -189,8 +189,14 @@ fn units_that_contradict_each_other_are_refused() {
             "no unit for \"b.position\"",
         ),
         ("t,a.position,a.velocity [deg/s]", "no unit for positions"),
-        ("t [rad],a.position,b.position", "[rad] is no unit of it"),
-        ("t,a.position [Nm],b.position", "[N m] is no unit of it"),
+        (
+            "t [rad],a.position,b.position",
+            "[rad] is not a unit of this quantity",
+        ),
+        (
+            "t,a.position [Nm],b.position",
+            "[N m] is not a unit of this quantity",
+        ),
     ] {
         let said = refusal(&format!("{header}\n0,1,2\n"));
         assert!(said.contains(words), "{said}");
@@ -201,7 +207,11 @@ fn units_that_contradict_each_other_are_refused() {
 fn the_header_names_the_unit_of_time() {
     for (header, unit_ns, remark) in [
         ("t [s]", 1_000_000_000, None),
-        ("time_ms", 1_000_000, Some("Time is in ms by its header.")),
+        (
+            "time_ms",
+            1_000_000,
+            Some("Time is in ms, as the header says."),
+        ),
         ("time [ms]", 1_000_000, Some("in ms")),
         ("t_us", 1_000, Some("in us")),
         ("Time (µs)", 1_000, Some("in us")),
@@ -237,7 +247,7 @@ fn dates_are_times() {
         ));
         assert_eq!(opened.rows[0].0, 1_767_225_600_000_000_000, "{dates:?}");
         assert_eq!(opened.span_ns(), 250_000_000);
-        opened.says("Time is read as dates");
+        opened.says("Time is read as ISO 8601 dates");
     }
     let said = refusal("time,a.position\n2026-01-01T00:00:00Z,1\n2026-01-01T25:00:00Z,1\n");
     assert!(
@@ -291,7 +301,7 @@ fn the_motion_tells_the_unit_of_time() {
             0.0,
             1.0,
             1.0,
-            Some("Time names no unit and is read as seconds: its rows are 1 s apart."),
+            Some("The time has no unit and is read as seconds: its rows are 1 s apart."),
         ),
     ] {
         let opened = by_name(&swinging(start_s, step_s, unit_s));

@@ -35,7 +35,8 @@ pub use zenoh::{Zenoh, ZenohEndpoints, ZenohRouter, zenoh_reason};
 
 /// Stall timeout: longest wait for a keep-all receiver that takes nothing. Then the sample counts as undelivered, and
 /// the sender does not wait for this receiver again until it has taken a sample.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: a busy disk or scheduler stops a receiver for a second or two; a longer wait only holds up all other
+/// receivers.
 pub const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Largest number of unread samples of a receiver.

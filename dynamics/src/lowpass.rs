@@ -3,7 +3,8 @@
 use std::f64::consts::{PI, SQRT_2};
 
 /// Share of a step that is still missing when the filter counts as settled.
-/// Tuned: the usual 1 % criterion of settling time, not swept.
+/// From: the 1 % criterion of settling time (Franklin, Powell and Emami-Naeini, *Feedback Control of Dynamic
+/// Systems*).
 const SETTLED: f64 = 0.01;
 
 /// A second-order Butterworth low-pass, `H(s) = ωc² / (s² + √2 ωc s + ωc²)` (S. Butterworth, "On the

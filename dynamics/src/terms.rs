@@ -170,9 +170,13 @@ pub fn effect(name: &str) -> Option<&'static Effect> {
     EFFECTS.iter().copied().find(|effect| effect.name == name)
 }
 
+/// Speed below which a joint is at standstill: its friction takes any value up to breakaway \[rad/s or m/s\].
+/// Chosen: half of the smallest Stribeck velocity that is searched, so that the fall of the friction is compared. A
+/// slower motion is within the velocity noise of encoders.
+pub const STANDSTILL_RAD_S: f64 = 0.01;
 /// Speed over which the sign of a velocity is smoothed \[rad/s\].
-/// Tuned: an order below the slowest motion that is compared; not swept.
-pub const SIGN_SMOOTHING_RAD_S: f64 = 0.002;
+/// Derived: a fifth of [`STANDSTILL_RAD_S`], so that the sign of a moving joint is 1 within 1e-4: tanh(5).
+pub const SIGN_SMOOTHING_RAD_S: f64 = STANDSTILL_RAD_S / 5.0;
 
 /// Smoothed sign of a velocity \[rad/s\]: tanh(qd / 0.002 rad/s). It has a value at rest, so a simulation can be
 /// integrated through a reversal.

@@ -90,10 +90,10 @@ impl Evaluation {
         progress: &Progress<'_>,
     ) -> Result<(), EvaluateError> {
         /// Completed fraction when the twins are fitted.
-        /// Tuned: by hand, for the progress that is shown; no number depends on it.
+        /// Layout: of the progress shown; no number depends on it.
         const FITTED: f64 = 0.1;
         /// Completed fraction when the detectors have learnt.
-        /// Tuned: by hand, for the progress that is shown; no number depends on it.
+        /// Layout: of the progress shown; no number depends on it.
         const LEARNT: f64 = 0.6;
         let request = &self.request;
         let name = format!("twin {}", request.twins[index].name);
@@ -254,7 +254,7 @@ fn leave_out_failed(
 
 /// Training time of a detector relative to one that is not a neural network.
 fn effort(entry: &Entry) -> usize {
-    /// Tuned: by hand, for the progress that is shown; no number depends on it.
+    /// Layout: of the progress shown; no number depends on it.
     const OF_NETS: usize = 30;
     if entry.random { OF_NETS } else { 1 }
 }

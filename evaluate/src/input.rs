@@ -36,7 +36,7 @@ pub enum TwinSource {
     File(Box<TwinFile>),
 }
 
-/// A twin to evaluate detectors behind.
+/// A twin whose expected effort the evaluated detectors use.
 #[derive(Debug, Clone)]
 pub struct TwinChoice {
     /// Name in tables and folders.
@@ -62,9 +62,9 @@ pub struct Request {
     pub detectors: Vec<&'static Entry>,
     /// Whether the user named the detectors; then a detector that cannot run is an error.
     pub explicit: bool,
-    /// Twins behind which the detectors run.
+    /// Twins with each of which the detectors are evaluated.
     pub twins: Vec<TwinChoice>,
-    /// Cutoff frequencies of the low-passes on velocity and on efforts \[Hz\]; `None` for the twin's own.
+    /// Cutoff frequencies of the low-passes on velocity and on efforts \[Hz\]; `None` for those of the twin.
     pub cutoffs_hz: [Option<f64>; 2],
     /// Number of detectors that run in parallel.
     pub jobs: usize,

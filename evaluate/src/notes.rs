@@ -18,7 +18,7 @@ use crate::runner::Runner;
 use crate::session::Played;
 
 /// Largest number of recordings for which an irregularity is noted one by one.
-/// Tuned: by eye, for the length of the notes.
+/// Layout: by eye; no number depends on it.
 const MOST_SINGLY: usize = 4;
 
 /// Irregularities of all recordings behind one twin.

@@ -1,7 +1,7 @@
-//! Step 4, fit: a set of effects with its numbers.
+//! Step 4, fit: evaluation of a set of effects at given parameters.
 //!
-//! In: the data of step 2 and a list of effects with numbers. Out: a [`fitted::Fit`], the residual that they leave at each
-//! joint, and how it changes with each number. `inference` refines the numbers.
+//! In: the data of step 2 and a list of effects with parameters. Out: a [`fitted::Fit`] with the residual of each
+//! joint, and its Jacobian with respect to the parameters. `inference` refines the parameters.
 
 pub mod consistent_bodies;
 pub mod fitted;

@@ -24,9 +24,9 @@ use crate::store::{Label, Note, Store, StoreError};
 use crate::wall::{Effect, Event, Now, Snapshot, Wall};
 use keeping::Keeping;
 
-/// Update interval of the snapshots. Resolution: a person sees no more.
+/// Update interval of the snapshots. Resolution: an observer does not notice a shorter delay.
 const SHOW_EVERY: Duration = Duration::from_millis(250);
-/// Period of the wall's clock. Resolution: a lost cell is detected within 1 s.
+/// Period at which the wall checks its timeouts. Resolution: a lost cell is detected within 1 s.
 const TICK: Duration = Duration::from_millis(250);
 /// Timeout of a query to a cell.
 const ASK_WITHIN: Duration = Duration::from_secs(5);

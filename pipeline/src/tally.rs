@@ -2,10 +2,7 @@
 
 use serde::Serialize;
 use tauscope_bus::{Contact, ContactFollower, Detection, EventKind, Name, TwinState, flags};
-
-/// Velocity above which a joint is moving \[rad/s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-const MOVING_RAD_S: f64 = 0.01;
+use tauscope_dynamics::terms::STANDSTILL_RAD_S;
 
 /// Sums over one twin's samples.
 #[derive(Debug, Clone)]
@@ -54,7 +51,9 @@ impl TwinTally {
             return;
         }
         let n = self.joints.len();
-        let moving = sample.velocity[..n].iter().any(|v| v.abs() > MOVING_RAD_S);
+        let moving = sample.velocity[..n]
+            .iter()
+            .any(|v| v.abs() > STANDSTILL_RAD_S);
         self.samples += 1;
         self.moving_samples += u64::from(moving);
         for (j, sums) in self.joints.iter_mut().enumerate() {

@@ -8,13 +8,13 @@ use super::verdict_text;
 use tauscope_explain::report::{Report, Verdict};
 
 /// Unexplained share of the error (RMS) below which it is negligible.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Layout: only the colour depends on it; 1 % of the squared error.
 const HARDLY: f64 = 0.1;
 /// Unexplained share of the error (RMS) below which it is small.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Layout: only the colour depends on it; 9 % of the squared error.
 const LITTLE: f64 = 0.3;
 
-/// Appearance of a verdict, which does not depend on colour alone.
+/// Appearance of a verdict. The sign repeats the meaning of the colour for readers who cannot distinguish colours.
 pub(super) struct Tone {
     /// Class in the style sheet.
     pub class: &'static str,
@@ -30,7 +30,7 @@ impl Tone {
             Verdict::Explained => ("explained", "✓"),
             Verdict::NothingMissing => ("nothing", "✓"),
             Verdict::NotEvaluated => ("none", "–"),
-            // A clear residual at one joint is not averaged away by explained joints.
+            // The share is a sum over all joints, in which explained joints would hide a clear residual at one joint.
             Verdict::UnknownRemains if !report.remaining.is_empty() || report.is_of_mended() => {
                 ("remains", "?")
             }
@@ -48,7 +48,7 @@ impl Tone {
         } else {
             "remains"
         };
-        // The badge begins like the title of the page, and its share is an RMS like every error on it.
+        // The badge repeats the verdict of the page title. Its share is an RMS, as are all errors on the page.
         let verdict = verdict_text(Verdict::UnknownRemains);
         let text = if share.is_finite() {
             format!("{verdict}: {} of the error (RMS)", percent(share))
@@ -60,8 +60,8 @@ impl Tone {
     }
 }
 
-/// Unexplained share of the error (RMS): the part that `unknown` curves describe, and the residual on held-out data
-/// beyond the noise. NaN if neither is known.
+/// Returns the unexplained share of the error (RMS): the part that `unknown` curves describe, plus the residual on
+/// held-out data in excess of the noise. NaN if neither is known.
 fn unknown_share(report: &Report) -> f64 {
     let known = rows(report).into_iter();
     let known = known.filter(|row| row.before.is_finite() && row.after.is_finite());
@@ -71,6 +71,7 @@ fn unknown_share(report: &Report) -> f64 {
         } else {
             0.0
         };
+        // Noise and residual are independent, so their squares are subtracted, not their RMS values.
         let beyond = (row.after.powi(2) - noise.powi(2)).max(0.0);
         (before + row.before.powi(2), left + beyond)
     });

@@ -17,7 +17,7 @@ pub struct Args {
     /// The pipeline file, or another one with `--kind`; by default `pipeline.yaml`.
     #[arg(conflicts_with = "pipeline")]
     file: Option<PathBuf>,
-    /// The pipeline file, as an option like that of `replay`.
+    /// The pipeline file, given as an option as for `replay`.
     #[arg(long, value_name = "FILE")]
     pipeline: Option<PathBuf>,
     /// Kind of the file. Files other than pipelines are checked against their schema: keys, types and enumerated

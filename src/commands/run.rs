@@ -22,7 +22,7 @@ pub struct Args {
     /// The pipeline file; by default `pipeline.yaml`.
     #[arg(conflicts_with = "pipeline")]
     file: Option<PathBuf>,
-    /// The pipeline file, as an option like that of `replay`.
+    /// The pipeline file, given as an option as for `replay`.
     #[arg(long, value_name = "FILE")]
     pipeline: Option<PathBuf>,
     /// Name of this host in the file, if the file has several.
@@ -65,7 +65,7 @@ impl Telling {
 fn seconds(text: &str) -> Result<Duration, String> {
     match text.parse::<f64>() {
         Ok(seconds) if (0.1..=1e6).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
-        _ => Err("it is a number of seconds from 0.1 to 1000000".to_owned()),
+        _ => Err("expected seconds, from 0.1 to 1000000".to_owned()),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Choice of the recordings on which a night is measured.
+//! Selection of the recordings for a nightly measurement.
 
 use std::path::{Path, PathBuf};
 
@@ -7,17 +7,17 @@ use tauscope_pipeline::report::{Problem, Report};
 
 use super::open;
 
-/// Maximum number of recordings of a night.
-/// Resolution: twelve spread over a day include its cold and its warm hours.
+/// Maximum number of recordings in a nightly measurement.
+/// Resolution: twelve spread over a day cover the cold and the warm robot.
 const MOST: usize = 12;
-/// Longest part of a recording that is measured, from its start, so that the work is bounded \[s\].
-/// Resolution: two minutes have several cycles of most programs.
+/// Maximum duration of a recording that is measured, from its start; bounds the computing time \[s\].
+/// Resolution: two minutes contain several cycles of most programs.
 pub const LONGEST_S: f64 = 120.0;
 /// Pause between two recordings above which the robot is assumed to have been switched off \[ns\].
 /// Resolution: a joint cools down within an hour.
 const PAUSE_NS: i64 = 3_600_000_000_000;
 
-/// The recordings of a night.
+/// Recordings selected for a nightly measurement.
 #[derive(Debug, PartialEq)]
 pub struct Choice {
     /// The files, oldest first.
@@ -27,11 +27,11 @@ pub struct Choice {
     pub hours_since_start: Option<f64>,
 }
 
-/// Chooses from the files in `paths`, and from the files in its folders, at most twelve recordings whose stamps are
-/// within `hours` before the newest, evenly spread. A file that is named itself is considered whatever its stamp.
+/// Selects at most twelve evenly spaced recordings among the files in `paths` and the MCAP files in its folders.
+/// Eligible are those that began at most `hours` before the newest, and files in `paths` of any age.
 ///
 /// # Errors
-/// Files that cannot be opened, or that there is no recording to measure.
+/// If a file in `paths` cannot be opened, or there is no recording to measure.
 pub fn choose(paths: &[PathBuf], hours: f64) -> Result<Choice, Report> {
     let mut report = Report::default();
     let mut all: Vec<(PathBuf, i64, i64)> = Vec::new();
@@ -60,7 +60,7 @@ pub fn choose(paths: &[PathBuf], hours: f64) -> Result<Choice, Report> {
     all.sort_by(|a, b| a.1.cmp(&b.1).then_with(|| a.0.cmp(&b.0)));
     let newest = all.last().map_or(0, |(_, begin, _)| *begin);
     let is_named = |path: &PathBuf| paths.contains(path);
-    // Time from the robot's start to each recording. The first recording after a pause marks a start.
+    // Time from the robot's start to each recording \[h\]. A recording after a long pause marks a start.
     let mut since = Vec::with_capacity(all.len());
     let mut run: Option<(i64, i64)> = None;
     for (_, begin, end) in &all {

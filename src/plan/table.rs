@@ -27,7 +27,7 @@ fn new(header: &[&str]) -> Table {
 fn stages(pipeline: &Pipeline) -> String {
     let mut table = new(&[
         "stage",
-        "is",
+        "kind",
         "cell",
         "host",
         "process",

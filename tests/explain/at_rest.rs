@@ -104,7 +104,7 @@ fn a_push_that_only_the_first_joint_feels_is_told_near_it_and_without_a_force() 
     let sentence = findings[0]["sentence"].as_str().unwrap();
     let force = findings[0]["parameters"].get("force_x_n");
     assert!(
-        force.is_none() && sentence.contains("how hard"),
+        force.is_none() && sentence.contains("neither the force"),
         "{report:#}"
     );
 }

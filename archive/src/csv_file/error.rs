@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 /// Longest piece of a table that is shown in an error \[characters\].
-/// Tuned: by eye, for the length of the message.
+/// Layout: by eye; no number depends on it.
 const SHOWN_CHARS: usize = 40;
 
 /// An error in a CSV table, with its file and line.

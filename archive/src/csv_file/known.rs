@@ -1,5 +1,5 @@
-//! The columns of a table that was opened by its name alone: by a file next to it, by the header of a known recorder,
-//! or by a header of a known layout.
+//! Detection of the columns of a table that is opened without a mapping: from a mapping file next to it, from the
+//! header of a known recorder, or from a header of a known layout.
 
 use std::path::{Path, PathBuf};
 
@@ -12,16 +12,16 @@ use crate::error::ArchiveError;
 /// Extension of the mapping file of a table: `NAME.columns.yaml` next to `NAME.csv`.
 const BESIDE: &str = "columns.yaml";
 /// Maximum number of header cells in an error message.
-/// Chosen: those of a table of six joints.
+/// Chosen: covers the header of a table of six joints, one time and three columns per joint.
 const SHOWN_CELLS: usize = 20;
 
-/// A recorder whose header is known.
+/// A program whose tables are recognised by their header.
 struct Recorder {
-    /// Program that writes such tables, as worded in remarks.
+    /// Name of the program in remarks.
     name: &'static str,
     time: &'static str,
     time_unit_ns: u64,
-    /// Name of the column of joint `{}`, counted from 0.
+    /// Column name of a joint's position; `{}` stands for the joint's index from 0.
     position: &'static str,
     velocity: &'static str,
     effort: &'static str,
@@ -68,7 +68,7 @@ const RECORDERS: [Recorder; 2] = [
 ];
 
 impl Recorder {
-    /// The mapping, if the header names this recorder's columns.
+    /// Returns the mapping, if the header names this recorder's columns.
     fn mapping(&self, header: &[String]) -> Option<CsvMapping> {
         let all = |pattern: &str| {
             let names =
@@ -106,7 +106,7 @@ fn beside(path: &Path) -> PathBuf {
     path.with_extension(BESIDE)
 }
 
-/// The mapping of the table at `path`, and a sentence that says how it was recognised, if it was.
+/// Returns the mapping of the table at `path`, and a sentence on how it was recognised unless a file declares it.
 ///
 /// # Errors
 /// [`ArchiveError::CsvMapping`] if there is neither a file nor a recognised header, or the file is wrong;
@@ -149,7 +149,7 @@ pub(crate) fn mapping_of(path: &Path) -> Result<(CsvMapping, Option<String>), Ar
             beside.display()
         ),
         Layout::Unknown => format!(
-            "the first line ({}) does not say which column is what. Write {}, for example `{{time: {{number: 1}}, \
+            "the first line ({}) does not identify the columns. Write {}, for example `{{time: {{number: 1}}, \
              position: {{first: 2}}, velocity: {{first: 8}}, effort: {{first: 14}}, joints: [joint1, ...]}}`. \
              Recognised without it are headers such as time, NAME.position, NAME.velocity, NAME.effort, and tables of {}",
             names(&header),

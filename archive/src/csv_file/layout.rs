@@ -12,20 +12,20 @@ enum Form {
     Before(char),
 }
 
-/// Forms that are recognised, the least ambiguous first: names of joints may hold underscores.
+/// Forms that are recognised, the least ambiguous first: names of joints may contain underscores.
 const FORMS: [Form; 4] = [
     Form::Behind('.'),
     Form::Behind('/'),
     Form::Behind('_'),
     Form::Before('_'),
 ];
-/// Words for each quantity. The first one that a table has is taken.
+/// Words for each quantity, in order of preference.
 const POSITION: [&str; 2] = ["position", "pos"];
 const VELOCITY: [&str; 2] = ["velocity", "vel"];
 const EFFORT: [&str; 3] = ["effort", "torque", "current"];
 /// Names of a time column, without its unit.
 const TIME: [&str; 6] = ["time", "t", "timestamp", "stamp", "datetime", "__time"];
-/// Words of columns that hold what was commanded, not what was measured.
+/// Words that mark a column as a command instead of a measurement.
 const COMMANDED: [&str; 11] = [
     "commanded",
     "command",
@@ -39,8 +39,8 @@ const COMMANDED: [&str; 11] = [
     "setpoint",
     "goal",
 ];
-/// Further words for the quantities, by which a header that is not recognised is described: too short or
-/// too general to be sure of.
+/// Further words for the quantities, from which the error for an unrecognised header suggests a mapping. They are too
+/// short or too general to accept without confirmation.
 const LIKELY: [(Quantity, &[&str]); 3] = [
     (
         Quantity::Velocity,

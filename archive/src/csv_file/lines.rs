@@ -1,15 +1,15 @@
-//! The text of a table with one kind of line end and a limit to the length of a record.
+//! Reader that normalises the line ends of a table and limits the length of its records.
 
 use std::io::{self, BufRead as _, BufReader, Read};
 
-/// Longest record: more than 50 000 numbers \[bytes\].
-/// Resolution: bounds memory.
+/// Maximum length of a record \[bytes\].
+/// Resolution: bounds memory; holds more than 50 000 numbers.
 pub(super) const MAX_LINE_BYTES: usize = 1 << 20;
-/// Bytes that are read at once; the delimiter is found in the first of them.
+/// Size of a read \[bytes\]. The delimiter is determined from the first one.
 /// Chosen: holds the header and the first row of any known recorder.
 pub(super) const BUFFER_BYTES: usize = 1 << 16;
 
-/// Writes every line end (`\r\n`, `\r`, `\n`) as `\n`, and refuses a record without end.
+/// Converts every line end (`\r\n`, `\r`, `\n`) to `\n`, and rejects a record that exceeds the limit.
 pub(super) struct Lines<R> {
     reader: BufReader<R>,
     after_return: bool,
@@ -28,12 +28,12 @@ impl<R: Read> Lines<R> {
         }
     }
 
-    /// Starts to count the bytes of a record. Bytes that a buffer behind this one holds are not counted.
+    /// Starts to count the bytes of a record. Bytes that the consumer has already buffered are not counted.
     pub(super) fn start_record(&mut self) {
         self.record_bytes = Some(0);
     }
 
-    /// Whether the reader behind asked for more than there is.
+    /// Returns whether a read has reached the end of the file.
     pub(super) fn at_end(&self) -> bool {
         self.at_end
     }
@@ -62,6 +62,7 @@ impl<R: Read> Read for Lines<R> {
         }
         if let Some(bytes) = &mut self.record_bytes {
             *bytes += written;
+            // The consumer reads ahead: one buffer of the counted bytes may belong to later records.
             if *bytes > MAX_LINE_BYTES + BUFFER_BYTES {
                 return Err(io::ErrorKind::InvalidData.into());
             }

@@ -1,9 +1,9 @@
 //! Numbers in cells, with a decimal point or a decimal comma.
 
-/// Reads numbers. The first number with a decimal sign settles which sign the table has.
+/// Parser of numeric cells. The first cell with a decimal sign fixes that sign for the whole table.
 #[derive(Debug)]
 pub(super) struct Numbers {
-    /// Whether a comma can be a decimal sign: it is no delimiter.
+    /// Whether a comma can be a decimal sign, because it is not the delimiter.
     may_have_commas: bool,
     sign: Option<Sign>,
 }
@@ -22,7 +22,7 @@ impl Numbers {
         }
     }
 
-    /// The number in a cell. An empty cell is NaN, as spreadsheets and pandas write it.
+    /// Parses a cell. An empty cell is NaN, because spreadsheets and pandas write missing values as empty cells.
     pub(super) fn number(&mut self, cell: &[u8]) -> Option<f64> {
         let text = std::str::from_utf8(cell).ok()?;
         if text.is_empty() {
@@ -37,7 +37,7 @@ impl Numbers {
             Some(_) if text.contains('.') => return None,
             Some((whole, rest)) => (format!("{whole}.{rest}").parse().ok()?, Sign::Comma),
         };
-        // `1,234` among decimal points is one thousand, or a slip.
+        // In a table with decimal points, `1,234` is a thousands separator or a typing error, so it is rejected.
         let settled = *self.sign.get_or_insert(sign);
         (settled == sign).then_some(number)
     }

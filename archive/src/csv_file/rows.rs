@@ -1,4 +1,4 @@
-//! A table row by row.
+//! Sequential access to the rows of a table.
 
 use std::path::Path;
 
@@ -18,9 +18,9 @@ const NS_PER_S: f64 = 1e9;
 pub(super) enum Row {
     /// A joint state, which [`Rows::state`] returns.
     State { line: u64, time_ns: i64 },
-    /// The file ends within this line.
+    /// The file ends within this line; its values are incomplete.
     Torn { line: u64 },
-    /// There is no more.
+    /// End of the file.
     End,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct Rows {
     found: Found,
     scales: Scales,
     numbers: Numbers,
-    /// `records` are on the first row, read to learn the width.
+    /// Whether the current record is the first row, read ahead for the number of columns.
     first_is_read: bool,
     clock: Clock,
     before_ns: Option<i64>,
@@ -38,7 +38,7 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Opens the table at `path`. Its time is in seconds until [`Rows::with_clock`] says otherwise.
+    /// Opens the table at `path`. Its time is in seconds unless [`Rows::with_clock`] sets another clock.
     pub(super) fn open(
         path: &Path,
         mapping: &CsvMapping,
@@ -86,23 +86,23 @@ impl Rows {
         self
     }
 
-    /// The joint state of the row that was read last.
+    /// Returns the joint state of the last row read.
     pub(super) fn state(&self) -> &JointState {
         &self.state
     }
 
-    /// The time's cell of the first row, before another one is read.
+    /// Returns the time cell of the first row; `None` once another row was read.
     pub(super) fn first_time(&self) -> Option<&[u8]> {
         (self.first_is_read && self.records.width() == self.width)
             .then(|| self.records.cell(self.found.time))
     }
 
-    /// The unit of the time that the header names \[ns\].
+    /// Returns the unit of the time in the header, if it has one \[ns\].
     pub(super) fn headed_unit_ns(&self) -> Option<u64> {
         self.scales.time_unit_ns
     }
 
-    /// Sentences on what was recognised in the rows that were read.
+    /// Returns remarks for the user on units and number format of the rows read so far.
     pub(super) fn remarks(&self) -> Vec<String> {
         let mut remarks = self.scales.remarks.clone();
         if self.numbers.have_commas() {
@@ -124,7 +124,7 @@ impl Rows {
         Ok(Row::State { line, time_ns })
     }
 
-    /// Reads the next row, but not its time.
+    /// Reads the next row without its time, whose unit is not yet known.
     pub(super) fn next_raw(&mut self) -> Result<Row, ArchiveError> {
         let row = self.next_record()?;
         if let Row::State { .. } = row {
@@ -134,13 +134,13 @@ impl Rows {
         Ok(row)
     }
 
-    /// The time of the row that was read last as its cell has it, if it is a number that is not negative.
+    /// Returns the time of the last row read in the unit of the table, if it is a non-negative number.
     pub(super) fn raw_time(&mut self) -> Option<f64> {
         let time = self.numbers.number(self.records.cell(self.found.time))?;
         (time.is_finite() && time >= 0.0).then_some(time)
     }
 
-    /// An error in the time of the row that was read last.
+    /// Returns the error that the time did not advance over `rows` rows.
     pub(super) fn clock_stands_still(&self, rows: u64, time_ns: i64) -> ArchiveError {
         self.records.refuse(CsvProblem::ClockStandsStill {
             column: self.found.time + 1,

@@ -1,9 +1,9 @@
-//! Factors to rad, m, N m and A by the units that a header names.
+//! Conversion factors to rad, m, N m and A from the units in a header.
 
 use super::mapping::Found;
 use super::units::{self, Dimension, Quantity, Unit};
 
-/// Factors to the units of joint states, by the header.
+/// Conversion factors to the units of joint states.
 #[derive(Debug, Default)]
 pub(super) struct Scales {
     /// Factor of each column of a position.
@@ -14,16 +14,16 @@ pub(super) struct Scales {
     pub(super) effort: Vec<f64>,
     /// Unit of the time \[ns\].
     pub(super) time_unit_ns: Option<u64>,
-    /// Sentences on the conversions.
+    /// Remarks for the user on the conversions.
     pub(super) remarks: Vec<String>,
 }
 
 impl Scales {
-    /// The factors for the columns `found` of a table with the names `header` (empty without one). A
-    /// velocity whose unit is in doubt is left out of `found`.
+    /// Returns the factors for the columns `found` of a table with the names `header` (empty without one). Removes a
+    /// velocity of ambiguous unit from `found`.
     ///
     /// # Errors
-    /// The quantity and why its units contradict each other.
+    /// The quantity whose units contradict each other, and the reason.
     pub(super) fn of(header: &[String], found: &mut Found) -> Result<Self, (&'static str, String)> {
         let position = Headed::of(header, &found.position, Quantity::Position)
             .map_err(|reason| ("position", reason))?;
@@ -35,10 +35,12 @@ impl Scales {
             Headed::of(header, &[found.time], Quantity::Time).map_err(|reason| ("time", reason))?;
         let mut remarks = Vec::new();
         match (position.angle, velocity.angle) {
+            // Without a unit the positions may be in rad or deg, and the velocities do not determine them.
             (None, Some(unit)) if unit.name == "deg/s" && !found.position.is_empty() => {
-                let reason = "the header names [deg/s] for velocities and no unit for positions: name it there, too";
+                let reason = "the header names [deg/s] for velocities and no unit for positions: add it there, too";
                 return Err(("position", reason.to_owned()));
             }
+            // Without a unit the velocities may be in rad/s or deg/s. The derivative of the positions is unambiguous.
             (Some(unit), None) if unit.name == "deg" && !found.velocity.is_empty() => {
                 found.velocity.clear();
                 velocity = Headed::default();
@@ -67,15 +69,15 @@ impl Scales {
     }
 }
 
-/// The columns of one quantity with the units that their header cells name.
+/// Units in the header cells of one quantity.
 #[derive(Default)]
 struct Headed {
     factors: Vec<f64>,
-    /// Each unit once.
+    /// Distinct units of the columns.
     units: Vec<&'static Unit>,
-    /// The one unit of angles, if any is named.
+    /// The unit of the rotary columns, if the header has one.
     angle: Option<&'static Unit>,
-    /// A text in brackets that is no unit of [`units`].
+    /// A text in brackets that is not a unit in [`units`].
     unknown: Option<String>,
 }
 
@@ -92,7 +94,9 @@ impl Headed {
                 None => {
                     if let Some(unit) = units::contradiction(cell, quantity) {
                         let name = unit.name;
-                        return Err(format!("column {cell:?}: [{name}] is no unit of it"));
+                        return Err(format!(
+                            "column {cell:?}: [{name}] is not a unit of this quantity"
+                        ));
                     }
                     silent = Some(cell);
                     let unknown = units::in_last_brackets(cell);
@@ -138,7 +142,7 @@ impl Headed {
             }
         });
         let unknown = self.unknown.iter().map(move |unknown| {
-            format!("{what} are headed [{unknown}], which is no unit that is known. They are read as they are.")
+            format!("{what} are headed [{unknown}], an unknown unit, and are not converted.")
         });
         units.chain(unknown)
     }

@@ -1,39 +1,39 @@
-//! Recognition of the format and the unit of a table's time.
+//! Detection of the format and the unit of a table's time column.
 
 use super::limits::TIME_S;
 use super::rows::{Row, Rows};
 use super::time::{Clock, date_ns};
 
 const NS_PER_S: f64 = 1e9;
-/// Units that numbers are tried in if they cannot be seconds, the longest first, with their length \[ns\].
+/// Candidate units, longest first, of numbers that cannot be seconds: name and length \[ns\].
 const UNITS: [(&str, u64); 3] = [("ms", 1_000_000), ("us", 1_000), ("ns", 1)];
-/// Lowest and highest rate of rows by which a unit is recognised \[Hz\].
-/// Chosen: interfaces of robots have 10 Hz to 8 kHz; slower logs of seconds stay seconds.
+/// Range of plausible row rates; a unit that leads to another rate is rejected \[Hz\].
+/// Chosen: interfaces of robots have 10 Hz to 8 kHz. A slower log is read in seconds unless its motion excludes them.
 const RATES_HZ: [f64; 2] = [5.0, 20_000.0];
-/// Range of a joint that moved \[rad, m\].
+/// Range of positions above which a joint is classified as moving \[rad, m\].
 /// Chosen: 100 times the noise of an encoder's position.
 const MOVED: f64 = 0.1;
-/// Farthest position that is used to recognise the unit \[rad, m\].
+/// Largest absolute position that is used to determine the unit \[rad, m\].
 /// Chosen: 150 turns; positions beyond it are broken data.
 const FARTHEST: f64 = 1e3;
-/// Speed that a joint which moved exceeds at some time \[rad/s, m/s\].
+/// Minimum peak speed of a moving joint \[rad/s, m/s\].
 /// Derived: no arm's joint is faster than 10 rad/s, which is 0.01 rad/s if milliseconds are read as seconds.
 const SLOWEST_PER_S: f64 = 0.01;
-/// First second of the dates that a number can stand for: the year 2000.
+/// Earliest time that is read as a date: the start of the year 2000 \[s since the epoch\].
 /// Chosen: no file format for joint states is older.
 const YEAR_2000_S: f64 = 946_684_800.0;
-/// Time steps whose median is the time between rows.
+/// Maximum number of time steps from whose median the row rate follows.
 /// Resolution: bounds memory.
 const MAX_STEPS: usize = 1000;
 
-/// The clock of a table whose rows are `rows`, by the first of: dates in the first row, a unit in the columns
-/// file (`unit_ns`), a unit in the header, the motion of the arm. With a sentence that says how it was recognised.
+/// Determines the clock of a table from the first of: dates in the first row, a unit in the columns file (`unit_ns`),
+/// a unit in the header, the motion of the arm. Returns it with a remark for the user on how it was determined.
 pub(super) fn clock_of(mut rows: Rows, unit_ns: Option<u64>) -> (Clock, Option<String>) {
     if rows
         .first_time()
         .is_some_and(|cell| date_ns(cell).is_some())
     {
-        let remark = "Time is read as dates (ISO 8601), in UTC where they name no zone.";
+        let remark = "Time is read as ISO 8601 dates; dates without a time zone are in UTC.";
         return (Clock::Dates, Some(remark.to_owned()));
     }
     if let Some(unit_ns) = unit_ns {
@@ -41,7 +41,7 @@ pub(super) fn clock_of(mut rows: Rows, unit_ns: Option<u64>) -> (Clock, Option<S
     }
     if let Some(unit_ns) = rows.headed_unit_ns() {
         let unit = UNITS.iter().find(|(_, own_ns)| *own_ns == unit_ns);
-        let remark = unit.map(|(unit, _)| format!("Time is in {unit} by its header."));
+        let remark = unit.map(|(unit, _)| format!("Time is in {unit}, as the header says."));
         return (Clock::Numbers { unit_ns }, remark);
     }
     let mut motion = Motion::default();
@@ -51,6 +51,7 @@ pub(super) fn clock_of(mut rows: Rows, unit_ns: Option<u64>) -> (Clock, Option<S
         let before = motion.steps.len();
         motion.add(time, &rows.state().position);
         let is_full = before < MAX_STEPS && motion.steps.len() == MAX_STEPS;
+        // Only a rate that is too low for seconds needs the peak speed over the whole table.
         if is_full && motion.is_fast() {
             break;
         }
@@ -64,9 +65,9 @@ pub(super) fn clock_of(mut rows: Rows, unit_ns: Option<u64>) -> (Clock, Option<S
 struct Motion {
     first: f64,
     last: f64,
-    /// The first [`MAX_STEPS`] of the time that are not zero.
+    /// The first [`MAX_STEPS`] positive time steps.
     steps: Vec<f64>,
-    /// Position of each joint where the time last changed.
+    /// Position of each joint at the last change of the time.
     before: Vec<f64>,
     /// Lowest and highest position of each joint.
     ranges: Vec<(f64, f64)>,
@@ -91,7 +92,7 @@ impl Motion {
         let step = time - self.last;
         if step > 0.0 {
             for (&before, &value) in self.before.iter().zip(position) {
-                // Not so for NaN.
+                // False for NaN.
                 if before.abs() <= FARTHEST && value.abs() <= FARTHEST {
                     self.fastest = self.fastest.max((value - before).abs() / step);
                 }
@@ -133,7 +134,7 @@ impl Motion {
             .parse()
             .unwrap_or(self.fastest);
         let doubt =
-            || format!("Time names no unit and is read as seconds: its rows are {step} s apart.");
+            || format!("The time has no unit and is read as seconds: its rows are {step} s apart.");
         if can_be_seconds && !is_slow(1.0) {
             return (second, Some(doubt()));
         }

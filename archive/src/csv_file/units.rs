@@ -17,15 +17,16 @@ pub(super) struct Unit {
     pub(super) name: &'static str,
     quantity: Quantity,
     pub(super) dimension: Dimension,
-    /// The unit in ns for a time, else in rad, m, rad/s, m/s, N m, N or A.
+    /// Factor to ns for a time, otherwise to rad, m, rad/s, m/s, N m, N or A.
     pub(super) factor: f64,
-    /// Spellings in brackets, as [`plain`] writes them.
+    /// Spellings in brackets, normalised by [`plain`].
     brackets: &'static [&'static str],
-    /// Spellings behind an underscore. Single letters are no units there: they may be names of joints.
+    /// Spellings after an underscore. Single letters except `s` are excluded, because they may be names of joints.
     suffixes: &'static [&'static str],
 }
 
-/// Units of one dimension in the columns of one quantity must be the same.
+/// Dimension of a unit. The columns of a quantity may mix dimensions (rotary and sliding joints), but not units of
+/// one dimension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Dimension {
     Time,
@@ -39,7 +40,7 @@ pub(super) enum Dimension {
 use Dimension::{Angle, Current, Force, Length, Time, Torque};
 
 impl Unit {
-    /// The unit to which values in this one are converted; `None` if they stay as they are.
+    /// Returns the unit to which values in this one are converted; `None` if they are not converted.
     pub(super) fn target(&self) -> Option<&'static str> {
         let mut alike = UNITS
             .iter()
@@ -49,9 +50,9 @@ impl Unit {
         target.filter(|&target| target != self.name)
     }
 
-    /// Whether the columns of one quantity cannot have both units.
+    /// Returns whether the columns of one quantity must not mix the two units.
     pub(super) fn contradicts(&self, other: &Self) -> bool {
-        // A motor current stands for a torque, but not for one in another column.
+        // A motor current is treated as a torque: columns in A and columns in N m must not be mixed.
         let dimension = |unit: &Self| match unit.dimension {
             Current => Torque,
             dimension => dimension,
@@ -61,10 +62,10 @@ impl Unit {
 }
 
 const DEG: f64 = PI / 180.0;
-/// Turns a minute \[rad/s\].
+/// One revolution per minute \[rad/s\].
 const RPM: f64 = PI / 30.0;
 
-/// The replacement character stands for `°` and `µ` of tables that are not in UTF-8.
+/// All units. U+FFFD stands for `°` or `µ` in a table that is not UTF-8.
 #[rustfmt::skip]
 const UNITS: [Unit; 19] = [
     unit("s", Quantity::Time, Time, 1e9, &["s", "sec", "second", "seconds"], &["s", "sec"]),
@@ -106,7 +107,7 @@ const fn unit(
     }
 }
 
-/// A header cell without its unit, and that unit, if it is one of `quantity`.
+/// Splits a header cell into its name and its unit, if it has a unit of `quantity`.
 pub(super) fn split(cell: &str, quantity: Quantity) -> (String, Option<&'static Unit>) {
     for (start, end) in groups(cell) {
         let unit = in_brackets(&cell[start + 1..end], quantity);
@@ -127,11 +128,11 @@ pub(super) fn split(cell: &str, quantity: Quantity) -> (String, Option<&'static 
     (cell.to_owned(), None)
 }
 
-/// The unit in brackets that a cell names and that is no unit of `quantity`.
+/// Returns a unit in brackets that belongs to another quantity than `quantity`.
 pub(super) fn contradiction(cell: &str, quantity: Quantity) -> Option<&'static Unit> {
     groups(cell).find_map(|(start, end)| {
         let group = plain(&cell[start + 1..end]);
-        // One letter may mean something else, as in `q (m)`, the measured one.
+        // A single letter may mean something else, such as "measured" in `q (m)`.
         if group.len() < 2 || in_brackets(&group, quantity).is_some() {
             return None;
         }

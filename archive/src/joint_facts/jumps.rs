@@ -1,30 +1,31 @@
-//! Detection of position jumps: steps between two samples that the recorded velocity does not explain. They occur
-//! when an encoder loses count, or when a position wraps after a whole turn.
+//! Detection of position jumps: changes between two samples that the recorded velocity does not explain. They occur
+//! if an encoder loses counts, or if a position wraps after a full turn.
 
 use std::f64::consts::TAU;
 
 use serde::Serialize;
 
 /// Longest time between two samples in which a jump is detected \[ns\].
-/// Physical: in 50 ms a velocity that changes by 10 rad/s² between two samples misses the step by 2 mrad.
+/// Physical: if the acceleration changes by Δa = 10 rad/s² within h = 50 ms, the trapezoidal integral of the velocity
+/// is wrong by h² Δa / 12 = 2 mrad.
 const LONGEST_STEP_NS: i64 = 50_000_000;
 /// Smallest residual of a jump \[rad or m\].
-/// Physical: fifty steps of a coarse encoder of 6000 steps per turn.
+/// Physical: fifty counts of a coarse encoder with 6000 counts per turn.
 const SMALLEST: f64 = 0.05;
 /// Smallest ratio of the residual of a jump to the mean residual of the other steps.
 /// Physical: with positions in degrees, every step has a residual of about the speed, while a jump is isolated.
 const TIMES: f64 = 20.0;
 /// Maximum number of jumps kept.
-/// Resolution: memory; more of them are a fault of another kind.
+/// Resolution: bounds memory; more jumps indicate a fault of another kind.
 const KEPT: usize = 8;
 /// Longest time between a jump and the jump back \[ns\].
-/// Physical: an encoder's glitch lasts for some samples.
+/// Physical: a glitch of an encoder lasts a few samples.
 const BACK_NS: i64 = 500_000_000;
-/// Relative tolerance to which a jump back has the size of the jump.
-/// Physical: the motion of the arm during the jump.
+/// Relative tolerance between the sizes of a jump and its return.
+/// Physical: covers the motion of the arm during the jump.
 const ALIKE: f64 = 0.1;
-/// Relative tolerance to which a jump is a whole number of turns.
-/// Physical: the motion of the arm during the jump.
+/// Relative tolerance between a jump and a whole number of turns.
+/// Physical: covers the motion of the arm during the jump.
 const LIKE_A_TURN: f64 = 0.02;
 
 /// A jump of a position.
@@ -34,12 +35,12 @@ pub struct Jump {
     pub at_s: f64,
     /// Residual: change of the position minus the integral of the velocity \[rad or m\].
     pub by: f64,
-    /// Time until it jumps back \[s\]; `None` if it does not.
+    /// Time until the position jumps back \[s\]; `None` if it does not.
     pub lasts_s: Option<f64>,
 }
 
 impl Jump {
-    /// Describes its size and its time.
+    /// Describes the size and the time of the jump.
     pub fn in_words(&self) -> String {
         let (by, at_s) = (self.by, self.at_s);
         let mut text = format!("by {by:.3} rad or m at {at_s:.3} s");
@@ -54,7 +55,7 @@ impl Jump {
     }
 }
 
-/// Contribution of one span to the sums of the comparison of position and velocity.
+/// Contribution of one span to the regression of the integrated velocity on the change of position.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Span {
     /// Position change squared.
@@ -135,6 +136,7 @@ impl Jumps {
     fn least(&self) -> f64 {
         let of_suspects: f64 = self.suspects.iter().map(|(miss, _)| miss.abs()).sum();
         let others = self.steps - self.suspects.len() as u64;
+        // The mean excludes the suspects, which could otherwise raise the threshold above themselves.
         let usual = (self.missed - of_suspects).max(0.0) / others.max(1) as f64;
         SMALLEST.max(TIMES * usual)
     }

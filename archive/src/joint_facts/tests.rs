@@ -3,7 +3,8 @@
 use super::*;
 use crate::ros::{Header, Time};
 
-/// A joint that swings by half a radian, its recorded velocity `slope` times the true one, positions in `units`.
+/// Returns the facts of a joint that swings by half a radian, with its velocity multiplied by `slope` and its
+/// position by `units`.
 fn swing(slope: f64, units: f64) -> JointFacts {
     let mut tallies = JointTallies::default();
     for i in 0..1000_u32 {
@@ -59,7 +60,7 @@ fn repeats_and_stamps_that_step_back_are_counted() {
     assert_eq!((tallies.repeated, tallies.backward), (1, 1));
 }
 
-/// A swinging joint sampled at 100 Hz, with `change` applied to each sample.
+/// Returns the facts of a joint that swings, sampled at 100 Hz, with `change` applied to each sample.
 fn swing_with(change: impl Fn(u32, &mut JointState)) -> JointFacts {
     let mut tallies = JointTallies::default();
     for i in 0..1000_u32 {

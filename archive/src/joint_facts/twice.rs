@@ -32,10 +32,10 @@ impl fmt::Display for Twice {
     }
 }
 
-/// Detector of such messages.
+/// Counter of messages that name a joint more than once.
 #[derive(Debug, Default)]
 pub(super) struct TwiceTally {
-    /// The first such joint, and the number of messages.
+    /// First joint found, with the number of messages so far.
     pub found: Option<Twice>,
     /// Whether the newest message names a joint more than once.
     is_newest: bool,

@@ -1,4 +1,4 @@
-//! The file next to a data set that describes its columns where their names do not.
+//! Columns file next to a data set. It describes columns whose names do not identify their quantity or joint.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ const BESIDE: &str = "columns.yaml";
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct ColumnsFile {
-    /// The robot's names of the joints, in the order of the positions.
+    /// Joint names of the robot, in the order of the positions.
     pub(super) joints: Option<Vec<String>>,
     pub(super) position: Option<Columns>,
     pub(super) velocity: Option<Columns>,
@@ -28,7 +28,7 @@ impl ColumnsFile {
     /// Returns the path of the columns file of the data set in the folder `root`, whether or not the file exists.
     pub(super) fn path(root: &Path) -> PathBuf {
         let named = root.file_name().map(|_| root.to_owned());
-        // `.` and `..` have no name until they are resolved.
+        // The paths `.` and `..` have no file name until they are resolved.
         let root = named.or_else(|| root.canonicalize().ok());
         let root = root.unwrap_or_else(|| PathBuf::from("dataset"));
         let mut name = root.file_name().unwrap_or_default().to_owned();

@@ -1,4 +1,4 @@
-//! The rows of an episode as joint states.
+//! Conversion of the rows of an episode to joint states.
 
 use std::path::PathBuf;
 
@@ -12,8 +12,8 @@ use crate::parquet_file::{Physical, Rows};
 use crate::ros::{self, JointState, Time};
 
 /// Largest deviation of a timestamp from the grid of the frame rate that is rounded to the grid \[s\].
-/// Physical: LeRobot refuses sets that are farther off (`tolerance_s`); a `float32` has steps of 0.06 ms after ten
-/// minutes.
+/// Physical: LeRobot rejects data sets with larger deviations (`tolerance_s`); the resolution of a `float32` after
+/// ten minutes is 0.06 ms.
 const TOLERANCE_S: f64 = 1e-4;
 const NS_PER_S: f64 = 1e9;
 
@@ -47,7 +47,7 @@ impl EpisodeCursor {
             Some(_) => Some(file.column(TIMESTAMP, episode.first_row)?),
             None => None,
         };
-        // A `float32` is too coarse for velocities, so the grid from which it was rounded is restored.
+        // Time in `float32` is too coarse to differentiate positions, so it is rounded to the grid of the frame rate.
         let is_coarse = file.physical(TIMESTAMP) != Some(Physical::Double);
         let columns = layout.features.iter();
         let columns = columns.map(|feature| file.column(feature, episode.first_row));
@@ -75,12 +75,12 @@ impl EpisodeCursor {
         })
     }
 
-    /// The joint state of the row that was read last.
+    /// Returns the joint state of the last row read.
     pub(super) fn state(&self) -> &JointState {
         &self.state
     }
 
-    /// Reads the next row: its time \[ns\]; `None` at the end of the episode.
+    /// Reads the next row. Returns its time \[ns\]; `None` at the end of the episode.
     pub(super) fn next_state(&mut self) -> Result<Option<i64>, ArchiveError> {
         if self.read >= self.rows {
             return Ok(None);
@@ -119,7 +119,7 @@ impl EpisodeCursor {
                 continue;
             }
             let reason = format!(
-                "{} numbers, but meta/info.json says more: the {what} of a joint is the one at {at}",
+                "the row has {} numbers, but meta/info.json places the {what} of a joint at index {at}",
                 row.len()
             );
             return Err(self.refuse(self.features[feature].clone(), reason));
@@ -151,7 +151,7 @@ impl EpisodeCursor {
             }
         };
         if !(0.0..=limits::TIME_S).contains(&time_s) {
-            let reason = format!("{time_s} is not a time in seconds from 0 on");
+            let reason = format!("{time_s} is not a valid time in seconds");
             return Err(self.refuse(TIMESTAMP.to_owned(), reason));
         }
         let time_ns = (time_s * NS_PER_S).round() as i64;

@@ -45,6 +45,7 @@ pub(crate) fn locate(path: &Path) -> Result<Option<Place>, ArchiveError> {
         }
         return Ok(None);
     }
+    // An existing file is not resolved by its name but by its content, in `of_table`.
     let number = number_of(path).filter(|_| !path.exists());
     let parent = path.parent().map(or_here);
     let root = parent.filter(|root| root.join(INFO).is_file());
@@ -76,7 +77,7 @@ pub(crate) fn of_table(path: &Path) -> Result<Place, ArchiveError> {
     let mut folders = absolute.ancestors().skip(1).take(MOST_FOLDERS);
     let root = folders.find(|folder| folder.join(INFO).is_file());
     let root = root.ok_or_else(|| refuse(LerobotProblem::NoSet))?;
-    // The path in the user's spelling, if that finds the data set.
+    // Prefers the folder in the user's spelling over the absolute path, if it is the data set.
     let depth = absolute.components().count() - root.components().count();
     let named = path.ancestors().nth(depth);
     let named = named.map(or_here).filter(|own| own.join(INFO).is_file());

@@ -1,4 +1,4 @@
-//! `meta/info.json`: the features of a row of the data set, and the files with the rows.
+//! `meta/info.json`: the features in a row of the data set, and the paths of its files.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -13,8 +13,8 @@ use crate::lerobot_error::{LerobotError, LerobotProblem};
 
 /// Path in the data set.
 pub(super) const INFO: &str = "meta/info.json";
-/// Longest file that is read \[bytes\].
-/// Resolution: bounds memory; a set with a hundred cameras has 100 kB.
+/// Maximum size of the file \[bytes\].
+/// Resolution: bounds memory; the file of a data set with a hundred cameras has 100 kB.
 const MAX_BYTES: u64 = 8 << 20;
 /// Default number of episodes per chunk, as in LeRobot.
 const CHUNK: u64 = 1000;

@@ -14,7 +14,7 @@ pub(super) const VELOCITY: [&str; 4] = [
     "observations.qvel",
     "observation.joint_velocities",
 ];
-/// Features that hold efforts: those of ALOHA and of its relatives.
+/// Features that hold efforts, as named for ALOHA and robots derived from it.
 pub(super) const EFFORT: [&str; 4] = [
     "observation.effort",
     "observations.effort",
@@ -32,7 +32,8 @@ pub(super) enum Kind {
     External,
 }
 
-/// Suffixes of names, after a dot, an underscore or a slash. A longer suffix precedes the ones that it ends in.
+/// Suffixes of names, after a dot, an underscore or a slash. The first match is used, so a longer
+/// suffix precedes those that it ends in.
 const ENDINGS: [(&str, Kind); 13] = [
     ("ext_eff", Kind::External),
     ("external_effort", Kind::External),
@@ -49,7 +50,8 @@ const ENDINGS: [(&str, Kind); 13] = [
     ("tor", Kind::Effort),
 ];
 
-/// Splits the name of an element into its joint and its quantity, if any: `joint_1.torque` in OpenArm's sets.
+/// Splits the name of an element into its joint and its quantity, if any, e.g. `joint_1.torque` in OpenArm's
+/// data sets.
 pub(super) fn split(name: &str) -> (&str, Option<Kind>) {
     for (ending, kind) in ENDINGS {
         let joint = name

@@ -1,4 +1,4 @@
-//! Attachments: only copied, never read into memory.
+//! Headers of attachments. The data of an attachment is copied without being loaded into memory.
 
 use std::io::{self, Read};
 
@@ -6,10 +6,10 @@ use mcap::records::AttachmentHeader;
 
 use crate::fields::Fields;
 
-/// Longest header: times, name and media type \[bytes\].
+/// Maximum size of an attachment's header, which holds times, name and media type \[bytes\].
 /// Resolution: bounds memory.
 const MAX_HEADER_BYTES: u64 = 64 << 10;
-/// Checksum behind an attachment's data \[bytes\].
+/// Size of the checksum after an attachment's data \[bytes\].
 /// Physical: the MCAP format: a CRC-32.
 const CRC_BYTES: u64 = 4;
 
@@ -36,6 +36,7 @@ pub(crate) fn attachment_header(
         return Ok(None);
     };
     let data_at = (bytes.len() - left) as u64;
+    // Data and checksum fill the rest of the record, or the declared length is wrong.
     let end = data_at
         .checked_add(data_len)
         .and_then(|end| end.checked_add(CRC_BYTES));

@@ -19,7 +19,7 @@ pub(super) struct ChunkHeader<'a> {
 }
 
 impl<'a> ChunkHeader<'a> {
-    /// Parses the header at the front of a chunk record's body. Returns it with the compressed records behind it. The
+    /// Parses the header at the start of a chunk record's body. Returns it with the compressed records after it. The
     /// body may be truncated.
     pub(super) fn parse(body: &'a [u8]) -> Option<(Self, &'a [u8])> {
         let mut fields = Fields(body);
@@ -59,7 +59,7 @@ impl Unpacker {
             .and_then(|len| packed.get(..len))
             .ok_or_else(|| {
                 format!(
-                    "its records should take {} bytes, its record leaves {}",
+                    "its header declares {} bytes of records, {} are present",
                     header.packed_bytes,
                     packed.len()
                 )
@@ -76,7 +76,7 @@ impl Unpacker {
         match header.compression {
             "" => records.extend_from_slice(packed),
             "zstd" => {
-                // Only address space until it is written to.
+                // Reserves address space; memory is allocated only when it is written to.
                 records.reserve(unpacked_bytes);
                 self.zstd
                     .decompress_to_buffer(packed, records)

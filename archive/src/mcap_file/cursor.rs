@@ -47,11 +47,12 @@ pub(crate) fn mcap_cursor(
         .collect();
     let wanted = |extent: &Extent| {
         let wanted = |&id: &u16| {
-            // An undeclared channel is damage, which loading the extent reports.
+            // An extent with an undeclared channel is loaded, because loading it reports the damage.
             topic_by_channel
                 .get(id as usize)
                 .is_none_or(Option::is_some)
         };
+        // Without a list of its channels, an extent may hold any of them.
         extent.channels.is_empty() || extent.channels.iter().any(wanted)
     };
     let extents = layout.extents.iter().enumerate();

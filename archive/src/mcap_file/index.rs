@@ -1,4 +1,4 @@
-//! The layout of a file from the index at its end and the records between its chunks.
+//! Layout of a file, read from the index at its end and the records between its chunks.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -10,15 +10,15 @@ use super::scan::{PlainRun, note_plain};
 use super::walk::{Step, Walk};
 use super::{MAX_RECORD_BYTES, RECORD_PREFIX_BYTES};
 
-/// Body of the footer record \[bytes\].
+/// Size of the body of the footer record \[bytes\].
 /// Physical: the MCAP format: two offsets of 8 bytes and a CRC of 4.
 const FOOTER_BODY_BYTES: u64 = 20;
-/// Footer record and the magic behind it \[bytes\].
+/// Size of the footer record and the magic after it \[bytes\].
 /// Physical: the MCAP format.
 const FILE_END_BYTES: u64 = RECORD_PREFIX_BYTES + FOOTER_BODY_BYTES + mcap::MAGIC.len() as u64;
 
-/// The summary's CRC is the last field of the footer.
-/// Physical: the MCAP format.
+/// Distance of the summary's CRC from the end of the file \[bytes\].
+/// Physical: the MCAP format: the CRC is the last field of the footer.
 pub(crate) const CRC_FROM_END_BYTES: u64 = 4 + mcap::MAGIC.len() as u64;
 
 pub(super) enum Outcome {
@@ -45,7 +45,7 @@ pub(super) fn read(file: &File, layout: &mut Layout) -> io::Result<Outcome> {
     let end = layout.file_bytes - FILE_END_BYTES;
     let unsound = |at, reason: String| Ok(Outcome::Unsound { at, reason });
     if start > end || start < mcap::MAGIC.len() as u64 {
-        return unsound(end, format!("it should begin at byte {start}"));
+        return unsound(end, format!("its start, byte {start}, is out of range"));
     }
     if let Some(reason) = check_crc(file, &footer, layout.file_bytes)? {
         return unsound(start, reason);
@@ -57,6 +57,7 @@ pub(super) fn read(file: &File, layout: &mut Layout) -> io::Result<Outcome> {
     let Some(statistics) = summary.statistics else {
         return Ok(Outcome::Absent);
     };
+    // A summary may omit channel records whose messages its statistics count. A scan finds them in the data.
     let known = |id| layout.channels.contains_key(id);
     if !statistics.channel_message_counts.keys().all(known) {
         return Ok(Outcome::Absent);

@@ -1,4 +1,4 @@
-//! The layout of a file: from its index, or by walking all of it.
+//! Layout of an MCAP file, read from its index, or by scanning the whole file.
 
 use std::fs::File;
 use std::io::Read;
@@ -10,10 +10,10 @@ use crate::damage::{Damage, DamageKind};
 use crate::error::ArchiveError;
 
 impl Layout {
-    /// Reads the index of the file, or the whole file if it has none that is sound.
+    /// Reads the layout from the index at the end of the file, or by scanning the file if it has no sound index.
     ///
     /// # Errors
-    /// If it cannot be opened, or not even its first record can be read.
+    /// If the file cannot be opened, or is unreadable from its first record on.
     pub(crate) fn read(path: &Path) -> Result<Self, ArchiveError> {
         let file = File::open(path).map_err(ArchiveError::io(path))?;
         let file_bytes = file.metadata().map_err(ArchiveError::io(path))?.len();
@@ -28,7 +28,7 @@ impl Layout {
             }
         }
         scan::read(&file, &mut layout).map_err(ArchiveError::io(path))?;
-        // A file that is torn within its data cannot have an index, so that is not reported.
+        // A truncated file has lost the index at its end as well, so only the truncation is reported.
         let torn = |damage: &Damage| damage.kind == DamageKind::TornTail;
         if layout.damage.iter().any(torn) {
             layout
@@ -38,7 +38,7 @@ impl Layout {
         layout.checked()
     }
 
-    /// A layout of which at least the first record could be read.
+    /// Returns the layout, or an error if the header, which is the first record, could not be read.
     fn checked(self) -> Result<Self, ArchiveError> {
         if self.header_read {
             return Ok(self);
@@ -61,6 +61,6 @@ fn check_magic(file: &File, path: &Path) -> Result<(), ArchiveError> {
     }
     Err(ArchiveError::Unreadable {
         path: path.to_owned(),
-        reason: "it does not begin as an MCAP file does".to_owned(),
+        reason: "it does not begin with the magic of MCAP".to_owned(),
     })
 }

@@ -1,4 +1,4 @@
-//! Iteration over the records in a part of a file; reads only the requested bodies.
+//! Iteration over the records in a byte range of a file. Only the requested bodies are read.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -19,11 +19,11 @@ pub(super) struct Record {
 pub(super) enum Step {
     /// A whole record.
     Record(Record),
-    /// A record whose declared length exceeds the rest of the part.
+    /// A record whose declared length exceeds the rest of the range.
     Torn(Record),
-    /// Fewer bytes than the prefix of a record, at this offset.
+    /// An incomplete record prefix at this offset.
     TornPrefix(u64),
-    /// The end of the part.
+    /// The end of the range.
     End,
 }
 
@@ -49,7 +49,7 @@ impl Walk {
         })
     }
 
-    /// Advances to the next record, and skips the unread rest of the preceding one.
+    /// Advances to the next record. Skips what was not read of the preceding one.
     pub(super) fn step(&mut self) -> io::Result<Step> {
         self.jump(self.next)?;
         let at = self.next;
@@ -87,7 +87,7 @@ impl Walk {
         Ok(())
     }
 
-    /// Reads the bytes from the current offset to the end of the part.
+    /// Reads the bytes from the current offset to the end of the range.
     pub(super) fn read_rest(&mut self, into: &mut Vec<u8>) -> io::Result<()> {
         let left = self.end.saturating_sub(self.position) as usize;
         self.read(left, into)

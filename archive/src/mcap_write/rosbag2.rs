@@ -13,7 +13,7 @@ pub(crate) struct BagTopic {
     pub(crate) type_name: String,
     pub(crate) encoding: String,
     pub(crate) type_hash: String,
-    /// The profiles as the channel's metadata has them; ours if it has none.
+    /// Quality-of-service profiles in the channel's metadata; `None` for the default profiles.
     pub(crate) offered_qos: Option<String>,
     pub(crate) messages: u64,
 }
@@ -23,12 +23,12 @@ pub(crate) struct BagTopic {
 pub(crate) struct BagFile {
     name: String,
     log_times_ns: Option<(i64, i64)>,
-    /// Number of messages; `None` for the only file of a bag, which has those of all topics.
+    /// Number of messages; `None` for the only file of a bag, which contains the messages of all topics.
     messages: Option<u64>,
 }
 
 impl BagFile {
-    /// The only file of a bag.
+    /// Describes the only file of a bag.
     pub(crate) fn new(path: &Path, log_times_ns: Option<(i64, i64)>) -> Self {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         Self {
@@ -38,7 +38,7 @@ impl BagFile {
         }
     }
 
-    /// One of several files.
+    /// Sets the number of messages, for one of several files of a bag.
     pub(crate) fn with_messages(mut self, messages: u64) -> Self {
         self.messages = Some(messages);
         self

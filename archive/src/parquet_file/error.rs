@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// An error in a Parquet file, with its path.
+/// Error of reading a Parquet file, with its path.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", path.display())]
 pub struct ParquetError {
@@ -30,19 +30,19 @@ pub enum ParquetProblem {
     /// A file that does not begin with the magic of Parquet.
     #[error("not a Parquet table: it does not begin with PAR1")]
     NotParquet,
-    /// A pointer of Git LFS whose content was not fetched.
+    /// A Git LFS pointer whose content was not fetched.
     #[error(
-        "a pointer of Git LFS in the place of the Parquet table: fetch the table with `git lfs pull`, or download the data \
+        "a Git LFS pointer instead of the Parquet table: fetch the table with `git lfs pull`, or download the data \
          set with `hf download`"
     )]
     LfsPointer,
     /// A truncated file, which does not end with the magic of Parquet.
     #[error(
-        "the Parquet table is torn: it does not end with PAR1, where it says what is in it; copy or download it again"
+        "the Parquet table is truncated: it does not end with a footer and PAR1; copy or download it again"
     )]
     Torn,
     /// A malformed footer.
-    #[error("the footer of the Parquet table is broken: {0}")]
+    #[error("the footer of the Parquet table is malformed: {0}")]
     Footer(&'static str),
     /// A declared size above the memory limit.
     #[error("{what} of the Parquet table is {bytes} bytes; at most {limit} are held in memory")]
@@ -64,7 +64,7 @@ pub enum ParquetProblem {
     },
     /// A column that is not numeric, or is stored in an unsupported way.
     #[error(
-        "column {column:?} is {what}, which is not read: write the table again with pyarrow, \
+        "column {column:?} is {what}, which is not supported: write the table again with pyarrow, \
          `pq.write_table(pq.read_table(FILE), FILE)`"
     )]
     Unsupported {

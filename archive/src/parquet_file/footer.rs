@@ -10,7 +10,7 @@ const MAX_GROUPS: usize = 1 << 20;
 /// Resolution: bounds time; an episode at 1 kHz has this number after four hours.
 const MAX_ROWS: u64 = 1 << 24;
 /// Maximum number of columns in an error message.
-/// Tuned: by eye, for the length of the message.
+/// Layout: by eye; no number depends on it.
 const MOST_NAMES: usize = 40;
 
 /// Storage type of numbers.

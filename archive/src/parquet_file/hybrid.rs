@@ -39,7 +39,7 @@ impl Hybrid {
         }
     }
 
-    /// Reads the head of the next run.
+    /// Reads the header of the next run.
     fn begin(&mut self, page: &[u8]) -> Option<()> {
         let page = page.get(..self.end)?;
         let mut head: u64 = 0;
@@ -52,10 +52,13 @@ impl Hybrid {
                 break;
             }
             shift += 7;
+            // A run header has at most 32 bits, which are five bytes of 7 bits.
             if shift > 28 {
                 return None;
             }
         }
+        // The lowest bit distinguishes bit-packed groups of eight numbers (1) from a repeated number (0). Eight
+        // numbers of `width` bits are `width` bytes.
         if head & 1 == 1 {
             let groups = head >> 1;
             let bytes = usize::try_from(groups)

@@ -1,4 +1,4 @@
-//! A page: its header, and its decompressed bytes.
+//! Pages of a column: parsing of headers, decompression, and access to the entries.
 
 use std::io::Read as _;
 
@@ -11,18 +11,18 @@ use super::{MAGIC, ParquetFile};
 /// Maximum size of a page, decompressed \[bytes\].
 /// Resolution: bounds memory; writers begin a new page after 1 MiB.
 const MAX_PAGE_BYTES: u64 = 32 << 20;
-/// Bytes first read for the header of a page; enough unless it has long statistics.
+/// Number of bytes first read for the header of a page; sufficient unless it has long statistics.
 const HEADER_BYTES: u64 = 512;
 /// Maximum size of the header of a page \[bytes\].
 /// Resolution: bounds memory.
 const MAX_HEADER_BYTES: u64 = 1 << 20;
 
-/// Encodings by their numbers in the format.
+/// Numbers of the supported encodings in the Parquet format.
 const PLAIN: i64 = 0;
 const PLAIN_DICTIONARY: i64 = 2;
 const RLE_DICTIONARY: i64 = 8;
 
-/// Kinds of pages by their numbers in the format.
+/// Numbers of the kinds of pages in the Parquet format.
 const DATA: i64 = 0;
 const DICTIONARY: i64 = 2;
 const DATA_2: i64 = 3;
@@ -35,7 +35,7 @@ struct Header {
     crc: Option<i64>,
     values: i64,
     encoding: i64,
-    /// Lengths of the levels, in pages of version 2 \[bytes\].
+    /// Lengths of the definition and repetition levels, in pages of version 2 \[bytes\].
     definition: i64,
     repetition: i64,
     is_packed: bool,

@@ -24,7 +24,7 @@ pub(crate) struct Rows {
     next_page: Option<u64>,
     dictionary: Vec<u8>,
     page: DataPage,
-    /// The first entry of the next row.
+    /// First entry of the next row, which is read to find the end of the current row.
     waiting: Option<Entry>,
 }
 
@@ -53,6 +53,7 @@ impl Rows {
             rows.before += group.rows;
             rows.group += 1;
         }
+        // Rows within a group have no known offsets, so those before `first` are decoded and discarded.
         let mut skipped = Vec::new();
         for _ in rows.before..first {
             if !rows.next_row(&mut skipped)? {

@@ -1,12 +1,12 @@
-//! Reader of the compact protocol of Thrift
-//! (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>), in which footers and page
-//! headers are written. It reads from a byte slice and allocates no memory.
+//! Reader of Thrift's compact protocol
+//! (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>), the encoding of footers and
+//! page headers. It reads from a byte slice and allocates no memory.
 
-/// Deepest nesting of structs and lists.
+/// Maximum nesting depth of structs and lists.
 /// Resolution: bounds the stack; footers have 7.
 const MAX_DEPTH: usize = 32;
 
-/// Types of fields.
+/// Field types of the compact protocol. A boolean field has its value as its type.
 const TRUE: u8 = 1;
 const FALSE: u8 = 2;
 const BYTE: u8 = 3;
@@ -24,7 +24,7 @@ const STRUCT: u8 = 12;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Broken;
 
-/// A position in the bytes.
+/// Cursor over the encoded bytes.
 #[derive(Debug)]
 pub(super) struct Reader<'a> {
     bytes: &'a [u8],
@@ -57,6 +57,7 @@ impl<'a> Reader<'a> {
     }
 
     fn varint(&mut self) -> Result<u64, Broken> {
+        // LEB128: seven bits per byte, least significant first; the high bit marks a continuation.
         let mut value = 0;
         for shift in (0..64).step_by(7) {
             let byte = self.byte()?;
@@ -70,10 +71,12 @@ impl<'a> Reader<'a> {
 
     fn zigzag(&mut self) -> Result<i64, Broken> {
         let value = self.varint()?;
+        // 0, 1, 2, 3 encode 0, -1, 1, -2, so that small negative numbers are short.
         Ok((value >> 1) as i64 ^ -((value & 1) as i64))
     }
 
-    /// Calls `each` at every field of the struct that begins here. It must read the field, or [`Reader::skip`] it.
+    /// Calls `each` for every field of the struct at the current position. `each` must read the field or
+    /// [`Reader::skip`] it.
     pub(super) fn fields(
         &mut self,
         mut each: impl FnMut(&mut Self, Field) -> Result<(), Broken>,
@@ -84,6 +87,7 @@ impl<'a> Reader<'a> {
             if head == 0 {
                 return Ok(());
             }
+            // The upper half is the distance to the previous field id; 0 if the id follows in full.
             let step = i16::from(head >> 4);
             id = if step == 0 {
                 i16::try_from(self.zigzag()?).map_err(|_| Broken)?
@@ -120,7 +124,7 @@ impl<'a> Reader<'a> {
         self.take(usize::try_from(length).map_err(|_| Broken)?)
     }
 
-    /// Calls `each` at every struct of the list that begins here.
+    /// Calls `each` for every struct of the list at the current position.
     pub(super) fn structs(
         &mut self,
         field: Field,
@@ -144,7 +148,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The length and the type of a list. No element is shorter than a byte.
+    /// Reads the length and the element type of a list. The length is bounded by the bytes left, since no element is
+    /// shorter than a byte.
     fn list(&mut self) -> Result<(usize, u8), Broken> {
         let head = self.byte()?;
         let short = usize::from(head >> 4);

@@ -1,4 +1,4 @@
-//! Message bodies as CDR: decompressed, and converted from ROS 1.
+//! Conversion of message bodies to CDR: decompression, and conversion from ROS 1.
 
 use zstd::zstd_safe;
 
@@ -6,21 +6,21 @@ use crate::compressed::ZSTD_MAGIC;
 use crate::ros::DecodeError;
 use crate::ros1_convert::{Conversion, Converter};
 
-/// Longest message after decompression \[bytes\].
+/// Maximum size of a decompressed message \[bytes\].
 /// Resolution: bounds memory.
 const MAX_MESSAGE_BYTES: u64 = 64 << 20;
 
-/// Reason why a stored body could not be brought into CDR.
+/// Reason why a stored body cannot be converted to CDR.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Flaw {
     /// Compressed data that cannot be decompressed.
     Compressed(&'static str),
-    /// Not a ROS 1 message of this type.
+    /// A body that is not a ROS 1 message of the declared type.
     Ros1(Conversion),
 }
 
 impl Flaw {
-    /// The error for the stored body, which has `len` bytes.
+    /// Returns the error for a stored body of `len` bytes.
     pub(super) fn error(self, len: usize) -> DecodeError {
         match self {
             Self::Compressed(reason) => DecodeError::Compressed { reason },
@@ -32,7 +32,7 @@ impl Flaw {
     }
 }
 
-/// Brings stored bodies into CDR, in reusable memory.
+/// Converter of stored bodies to CDR, with reusable buffers.
 #[derive(Default)]
 pub(super) struct Bodies {
     /// Created for the first compressed message.
@@ -43,8 +43,9 @@ pub(super) struct Bodies {
 }
 
 impl Bodies {
-    /// The message `stored` as CDR. rosbag2 compresses single messages in its mode `message`; CDR never begins as
-    /// Zstandard does. A flawed body is given as stored, with the flaw.
+    /// Returns the message `stored` as CDR. In its mode `message`, rosbag2 compresses each message; the magic number
+    /// of Zstandard identifies them, because no CDR message begins with it. A body that cannot be converted is
+    /// returned unconverted, with the flaw.
     pub(super) fn cdr<'a>(
         &'a mut self,
         stored: &'a [u8],
@@ -71,7 +72,7 @@ impl Bodies {
 /// Decompresses `stored` over `into`.
 ///
 /// # Errors
-/// The reason, in words.
+/// The reason, as a phrase for the message.
 fn decompress(
     decompressor: &mut Option<zstd_safe::DCtx<'static>>,
     stored: &[u8],
@@ -86,9 +87,9 @@ fn decompress(
     if decompressor.is_none() {
         *decompressor = zstd_safe::DCtx::try_create();
     }
-    let decompressor = decompressor.as_mut().ok_or("there is too little memory")?;
+    let decompressor = decompressor.as_mut().ok_or("out of memory")?;
     into.clear();
-    // Only address space until it is written to.
+    // Pages are allocated on first write, so an unknown size does not cost the full limit.
     into.reserve(bytes as usize);
     let decompressed = decompressor.decompress(into, stored);
     decompressed.map_err(zstd_safe::get_error_name)?;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::{Keep, Position};
 
-/// A sample on its way, or a reason why there is none.
+/// A queued payload with its position in the sender's stream.
 #[derive(Debug)]
 pub(crate) struct Message<P> {
     /// Session epoch of the sender.
@@ -44,7 +44,8 @@ struct State<P> {
     closed: bool,
     /// The stall timeout has expired and the reader has taken nothing since.
     stuck: bool,
-    /// Sleeping readers and writers. Without a sleeper there is no notification, which would cost a system call.
+    /// Numbers of sleeping readers and writers. They change under the lock, so no wake-up is missed although a
+    /// notification, which costs a system call, is sent only to a sleeper.
     sleeping: Sleeping,
 }
 
@@ -60,6 +61,7 @@ impl<P> Queue<P> {
             keep,
             depth,
             state: Mutex::new(State {
+                // One more than `depth`: `push_over` appends the end of a stream to a full queue.
                 entries: VecDeque::with_capacity(depth + 1),
                 begin: None,
                 closed: false,
@@ -75,13 +77,14 @@ impl<P> Queue<P> {
         self.keep
     }
 
-    /// Appends `entry`. Under [`Keep::All`], waits at most `patience` for room.
+    /// Appends `entry`. Under [`Keep::All`], waits at most `patience` for a free slot.
     pub(crate) fn push(&self, entry: Message<P>, patience: Duration) -> Pushed {
         let mut state = self.lock();
         state.begin.get_or_insert(Position {
             instance: entry.instance,
             next: entry.sequence,
         });
+        // A hung reader costs its writer one timeout, not one per sample.
         if self.keep == Keep::All && !state.stuck {
             let full = |s: &mut State<P>| s.entries.len() >= self.depth && !s.closed;
             if full(&mut state) {

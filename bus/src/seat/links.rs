@@ -11,7 +11,7 @@ use crate::link::{
 use crate::sample::{Detection, Health, JointState, Sample, SampleKind, SampleRef, TwinState};
 
 /// Stall timeout of a sender behind a queue, for a receiver that is alive and takes nothing.
-/// Tuned: by hand, on no recorded seeds; not swept. Longer than any queue lasts.
+/// Chosen: longer than any queue lasts, so that the queue's limits decide what becomes of a stalled receiver.
 const SPILLED_PATIENCE: Duration = Duration::from_mins(10);
 
 /// The transports of a process, opened on first use. Clones share them.

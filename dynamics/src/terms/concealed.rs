@@ -5,10 +5,10 @@ use super::Site;
 use crate::{Data, mass_matrix};
 
 /// Largest share of the motor's effort that friction and springs may take.
-/// Tuned: so that motors of simulated arms can do the motion; not swept.
+/// Chosen: for simulated cells only; more than half of the motor's effort stays for the motion.
 const LARGEST_SHARE: f64 = 0.4;
 /// Smallest size tried, as a share of the largest.
-/// Tuned: far below what noise lets be seen; not swept.
+/// Resolution: lower end of a bisection, far below what noise reveals.
 const SMALLEST: f64 = 1e-4;
 
 /// Parameters by name, as in files.

@@ -15,7 +15,7 @@ use crate::{Data, forward_kinematics, link_pose};
 /// Physical: farther than any arm on a fixed base reaches.
 const RANGE_M: f64 = 10.0;
 /// Reciprocal of the share of time that the arm is in a drawn wall: a fifth.
-/// Tuned: for simulated cells only; not swept.
+/// Chosen: for simulated cells only; enough contact to identify the wall, and enough free motion to compare it with.
 const IN_IT: usize = 5;
 
 /// Distance of a wall that the arm is in for that share of the time \[m\]; `None` if the arm begins in it.

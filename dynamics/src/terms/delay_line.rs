@@ -3,7 +3,7 @@
 use super::{Effect, MotionSample, Site, Term};
 
 /// Number of samples in memory: enough for a second at 1 kHz.
-/// Tuned: from the longest delay and the usual rates; not swept.
+/// Resolution: memory; the longest delay searched is 1 s, and a denser recording is interpolated.
 const CAPACITY: usize = 1024;
 
 /// Delayed efforts, linearly interpolated between samples. Before the first sample its value is held.

@@ -9,7 +9,7 @@ use super::{
 
 /// Share of the band over which its edge is rounded: ripple and noise of the current dither it, and a fit needs a
 /// finite slope.
-/// Tuned: by the slope that it leaves, 4 at most; not swept.
+/// Chosen: it leaves a slope of 1 / 0.25 = 4 at most; a wider rounding would resemble a gain.
 const ROUNDED: f64 = 0.25;
 
 /// Narrowest band \[N m or N\].

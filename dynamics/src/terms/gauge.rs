@@ -1,12 +1,9 @@
 //! The argument of a curve, computed sample by sample.
 
-use super::{Against, MotionSample, sign};
+use super::{Against, MotionSample, STANDSTILL_RAD_S, sign};
 
-/// Speed below which a joint is at rest \[rad/s or m/s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-const REST_RAD_S: f64 = 0.01;
 /// Shortest standstill that counts as rest \[s\]; a reversal is shorter.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Derived: a reversal takes 2 [`STANDSTILL_RAD_S`] / a, which is 0.1 s at an acceleration a of only 0.2 rad/s².
 const LEAST_REST_S: f64 = 0.1;
 
 /// Initial time since the last rest, before any rest was observed \[s\].
@@ -72,7 +69,7 @@ impl Gauge {
                 self.turned
             }
             Against::SinceRest => {
-                if at.velocity[joint].abs() < REST_RAD_S {
+                if at.velocity[joint].abs() < STANDSTILL_RAD_S {
                     self.rested_s += at.dt_s;
                     if self.rested_s >= LEAST_REST_S {
                         self.moved_s = 0.0;
@@ -87,7 +84,7 @@ impl Gauge {
             }
             Against::SinceTurn => {
                 let velocity = at.velocity[joint];
-                if velocity.abs() >= REST_RAD_S {
+                if velocity.abs() >= STANDSTILL_RAD_S {
                     let before = std::mem::replace(&mut self.direction, sign(velocity));
                     if before * self.direction < 0.0 {
                         self.travel = 0.0;

@@ -1,4 +1,4 @@
-//! A joint whose transmission gives way like a spring.
+//! Elasticity of a joint: a spring between rotor and link.
 
 use super::law::array;
 use super::split_joint::split_joint;
@@ -10,7 +10,7 @@ use super::{
 
 /// Share of the critical damping that the link has against a rotor that stands still. It is none of the
 /// parameters: motions of robots do not show it.
-/// Tuned: a lightly damped gear; not swept.
+/// Physical: resonances of geared joints have damping ratios of about 0.02 to 0.1.
 const DAMPING_RATIO: f64 = 0.05;
 
 /// A spring between rotor and link, T = -K δ - D δ̇ with the damping D = 2 ζ √(K M), ζ = 0.05, and a rotor of

@@ -8,7 +8,8 @@ use super::{
 use crate::Inertia;
 
 /// Largest offset of a centre of mass that is drawn at random \[m\].
-/// Tuned: for simulated cells only; not swept.
+/// Chosen: for simulated cells only; cables, covers and motors that a CAD model lacks shift a link's centre by some
+/// centimetres.
 const MOST_DRAWN_M: f64 = 0.06;
 
 /// Shift of a link's centre of mass, in the link's frame; its mass and the inertia about the centre stay the same. To

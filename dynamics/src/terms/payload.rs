@@ -45,7 +45,7 @@ pub static EFFECT: Effect = Effect {
 };
 
 /// Radius of gyration of a drawn body \[m\].
-/// Tuned: for simulated cells only; not swept.
+/// Chosen: for simulated cells only; that of a compact body of about 10 cm, such as a gripper.
 const DRAWN_RADIUS_M: f64 = 0.04;
 
 /// Draws a random body. If it is temporary, its start and end are drawn from these ranges, as shares of the shortest

@@ -1,4 +1,4 @@
-//! All terms of a robot: from the rigid body's effort to the recorded one.
+//! Chain of all terms of a robot, from the rigid-body effort to the recorded effort.
 
 use super::{Layer, MotionSample, Term, TermError, TermSpec};
 use crate::Model;
@@ -13,7 +13,7 @@ pub struct Physics {
 }
 
 impl Physics {
-    /// Sorts the terms, for a robot of `joint_count` joints.
+    /// Creates the chain for a robot of `joint_count` joints. Sorts the terms by layer.
     pub fn new(mut terms: Vec<Box<dyn Term>>, joint_count: usize) -> Self {
         terms.sort_by_key(|term| term.effect().layer);
         let before = |layer: Layer| terms.iter().filter(|t| t.effect().layer < layer).count();
@@ -24,8 +24,9 @@ impl Physics {
         }
     }
 
-    /// Builds the terms of `specs` for a robot. Each term is built for the robot as changed by the previous ones,
-    /// whatever the order of the list: a payload acts on a tilted base, and an elastic joint carries the payload.
+    /// Builds the terms of `specs` for a robot. Terms that change the model (a payload, a tilted base) are built in
+    /// list order, each for the model as changed so far. Other body terms (an elastic joint) are built for the final
+    /// model. The efforts do not depend on the order of the list.
     ///
     /// # Errors
     /// If a term cannot be built.
@@ -40,6 +41,7 @@ impl Physics {
             }
             terms.push(term);
         }
+        // A body term in front of a payload in the list must act on the robot with the payload, too.
         for i in unaltering {
             if terms[i].effect().layer == Layer::Body {
                 terms[i] = specs[i].build(&altered)?;
@@ -70,14 +72,14 @@ impl Physics {
         }
     }
 
-    /// Transforms `effort`, the rigid body's at this instant, into the recorded one \[N m or N\]; call once per
-    /// sample. [`MotionSample::transmitted`] is ignored, because it is computed from `effort`. Does not allocate.
+    /// Transforms `effort` in place from the rigid-body effort to the recorded effort \[N m or N\]. Call it once per
+    /// sample. Computes [`MotionSample::transmitted`] itself and ignores that of `at`. Does not allocate.
     pub fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         self.act_bodies(at, effort);
         self.act_joints(at, effort);
     }
 
-    /// First half of [`Physics::act`]: transforms `effort`, the rigid body's, into the transmitted effort.
+    /// First half of [`Physics::act`]: from the rigid-body effort to the effort that the gears transmit.
     pub fn act_bodies(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         let at = with(&mut self.transmitted, at, effort);
         for term in &mut self.terms[..self.bodies] {
@@ -85,7 +87,7 @@ impl Physics {
         }
     }
 
-    /// Second half of [`Physics::act`]: transforms `effort`, the transmitted one, into the recorded effort.
+    /// Second half of [`Physics::act`]: from the transmitted to the recorded effort.
     pub fn act_joints(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         let at = with(&mut self.transmitted, at, effort);
         for term in &mut self.terms[self.bodies..] {

@@ -8,7 +8,7 @@ use super::{
 
 /// The `LuGre` model with a static friction that equals the kinetic one (Canudas de Wit, Olsson, Åström
 /// and Lischinsky, "A New Model for Control of Systems with Friction", 1995, equations 1 to 3), written
-/// in the share u = σ0 z / Fc of the bristles' deflection at which they slide, and κ = σ0 / Fc:
+/// in the normalised bristle deflection u = σ0 z / Fc, which is ±1 during sliding, and κ = σ0 / Fc:
 ///
 /// effort = Fc u + σ1 (qd - |qd| u),   du/dt = κ (qd - |qd| u)
 pub(super) static EFFECT: Effect = Effect {
@@ -16,9 +16,9 @@ pub(super) static EFFECT: Effect = Effect {
     words: Words::new(
         "Pre-sliding hysteresis",
         "presliding hysteresis",
-        "The joint gives like a spring before it slips, so that friction lags behind each reversal.",
+        "Friction is elastic before the joint slips, so it builds up gradually after each reversal.",
         "",
-        "The friction of joint {place}, {coulomb_nm}, builds up over its bristles after each reversal, with {bristle_stiffness_nm_per_rad}.",
+        "The friction of joint {place}, {coulomb_nm}, builds up elastically after each reversal, with a presliding stiffness of {bristle_stiffness_nm_per_rad}.",
     ),
     family: Family::Friction,
     place: PlaceKind::Joint,
@@ -43,7 +43,7 @@ pub(super) static EFFECT: Effect = Effect {
     excitation: Excitation::Speeds,
     exported: super::Exported::Nearest(
         |p| vec![super::Quantity::DryFriction(p[0])],
-        "the dry friction is written; a simulator lets the joint creep or holds it, and does not give like a spring",
+        "only the dry friction is exported; a simulator lets a joint at rest creep or holds it, without an elastic deflection",
     ),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
@@ -69,7 +69,7 @@ struct PreslidingHysteresis {
     joint: usize,
     /// Fc, σ1, κ.
     values: [f64; 3],
-    /// Share of the deflection at which the bristles slide, -1 to 1.
+    /// Bristle deflection u relative to that during sliding, -1 to 1.
     deflection: f64,
     velocity: Option<f64>,
 }

@@ -1,4 +1,4 @@
-//! Inertia of the rotor, as seen through the gear.
+//! Rotor inertia, reflected to the joint side of the gear.
 
 use super::law::joint_law;
 use super::{
@@ -6,16 +6,16 @@ use super::{
     Words,
 };
 
-/// Effort J qdd, J on the joint side of the gear (Siciliano et al., *Robotics*, 2009, equation 7.77, its
-/// gyroscopic part left out).
+/// Effort J qdd, with J reflected to the joint side of the gear (Siciliano et al., *Robotics*, 2009, equation 7.77,
+/// without its gyroscopic part).
 pub(super) static EFFECT: Effect = Effect {
     name: "rotor_inertia",
     words: Words::new(
         "Rotor inertia",
         "rotor inertia",
-        "Inertia of motor and gear, seen through the gear, that only acceleration shows.",
+        "Inertia of motor and gear, reflected to the joint, that acts only while the joint accelerates.",
         "",
-        "Joint {place} turns a rotor of {inertia_kgm2} (armature) that the twin leaves out.",
+        "Joint {place} has a rotor inertia (armature) of {inertia_kgm2} that the twin does not model.",
     ),
     family: Family::Transmission,
     place: PlaceKind::Joint,
@@ -30,6 +30,7 @@ pub(super) static EFFECT: Effect = Effect {
     exported: super::Exported::As(|p| vec![super::Quantity::Armature(p[0])]),
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
+        // The inertia that needs the drawn effort at the largest acceleration.
         let most = draw.largest_acceleration_rad_s2;
         Drawn::new(draw.efforts_nm(), move |f| vec![("inertia_kgm2", f / most)])
     }),

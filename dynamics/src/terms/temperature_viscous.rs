@@ -10,7 +10,7 @@ use super::{
 /// Physical: no gearbox warms up at once.
 const SEARCHED_FROM_S: f64 = 3.0;
 /// Shortest time constant that is drawn \[s\].
-/// Tuned: for simulated cells only, whose recordings are short; not swept.
+/// Chosen: for simulated cells only; just above [`SEARCHED_FROM_S`], because their recordings are short.
 const FASTEST_DRAWN_S: f64 = 3.2;
 
 /// Effort (Fw + Fx exp(-t/T)) qd, where t is the time since the start of the recording, at which the joint is cold.

@@ -370,6 +370,19 @@ pub(super) mod tests {
         assert!((x - end.angle).abs() < 1e-6 && (v - end.rate).abs() < 1e-4);
     }
 
+    /// Guards against an elasticity that was found on a sound arm by the alias of its resonance.
+    #[test]
+    fn a_mode_above_the_nyquist_frequency_is_static() {
+        let (frequency, dt_s, forcing) = (400.0, 0.01, 3.0);
+        let start = Deviation {
+            angle: 0.2,
+            rate: -1.0,
+        };
+        let at = Oscillator::new(frequency, 0.05, dt_s).step(start, [forcing, forcing]);
+        assert!((at.angle - forcing / (frequency * frequency)).abs() < 1e-15);
+        assert!(at.rate.abs() < 1e-12);
+    }
+
     #[test]
     fn nothing_moves_nothing() {
         let model = Model::massless(&["one".to_owned(), "two".to_owned()]);

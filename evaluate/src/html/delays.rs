@@ -9,7 +9,7 @@ use crate::metrics::Matched;
 use crate::metrics::statistics::{Distribution, quantile};
 
 /// Number of bars of a histogram.
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Layout: by eye; no number depends on it.
 const BARS: usize = 24;
 
 /// One histogram per detector, all to the same scale; `None` if no detector found a contact.

@@ -7,18 +7,18 @@ use super::line_class;
 use crate::judged::Judged;
 use crate::metrics::samples::Labelled;
 
-/// Approximate number of points of a whole curve.
-/// Resolution: about one per pixel; changes the page's size.
+/// Approximate number of points of a full curve.
+/// Resolution: about one per pixel; also determines the size of the page.
 const POINTS: usize = 400;
-/// Approximate number of points of a whole curve from which the enlarged part is taken.
-/// Resolution: as above, over a twentieth of the range.
+/// Approximate number of points of a full curve from which the enlarged part is cut.
+/// Resolution: as [`POINTS`], for a twentieth of the range.
 const FINE: usize = 8000;
-/// Upper end of the enlarged false positive rates; no user accepts a higher rate.
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Highest false positive rate of the enlarged curves; users do not accept a higher one.
+/// Layout: by eye; no number depends on it.
 const ZOOM: f64 = 0.05;
 
-/// One figure with a curve per detector, of the first seed; `None` if no test recording has both contact and free
-/// motion.
+/// Returns a figure with one curve per detector, of the first seed; `None` if no test recording has both contact and
+/// contact-free motion.
 pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
     let curves: Vec<_> = (judged.iter().enumerate())
         .map(|(index, judged)| (index, judged, samples(judged).roc(POINTS)))
@@ -41,17 +41,18 @@ pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
                 (picture(&fine, ZOOM, "up to 5 % false positives"))
                 p.legend {
                     @for (at, (index, judged, curve)) in curves.iter().enumerate() {
+                        // Later curves are drawn over earlier ones.
                         @let covered = curves[at + 1..].iter().find(|(.., later)| later == curve);
                         span class={ "key own " (line_class(*index)) } {
                             (judged.label) " (AUC " (format!("{:.3}", judged.first().samples.auc)) ")"
-                            @if let Some((_, by, _)) = covered { ", under " (by.label) }
+                            @if let Some((_, by, _)) = covered { ", hidden by " (by.label) }
                         }
                     }
                     span.key.chance { "chance (0.5)" }
                 }
             }
             details {
-                summary { "The whole curves" }
+                summary { "Full range" }
                 div.curves { (picture(&whole, 1.0, "whole")) }
             }
         }
@@ -66,7 +67,7 @@ fn picture(curves: &[(usize, Vec<(f64, f64)>)], most: f64, what: &str) -> Markup
     };
     html! {
         svg.plot.square viewBox="0 0 560 486" role="img" aria-label={ "Receiver operating characteristics, " (what) } {
-            (panel.frame(5, 5, Some("False positive rate: share of free samples above"), "True positive rate: share of contact samples above"))
+            (panel.frame(5, 5, Some("False positive rate (contact-free samples above threshold)"), "True positive rate (contact samples above threshold)"))
             (panel.line("line chance", &[0.0, most], &[0.0, most]))
             @for (index, curve) in curves {
                 @let (xs, ys): (Vec<f64>, Vec<f64>) = curve.iter().copied().unzip();

@@ -9,16 +9,16 @@ use crate::judged::Judged;
 use crate::metrics::Scored;
 
 /// Largest number of recordings that are drawn.
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const RECORDINGS: usize = 24;
 /// Number of plots that are initially open.
-/// Tuned: by eye, for the layout of the page.
+/// Layout: by eye; no number depends on it.
 const OPEN: usize = 3;
 /// Largest number of points of a line.
 /// Resolution: about one per pixel; changes the page's size.
 const POINTS: usize = 700;
 /// Upper end of the score axis, in thresholds; higher scores are clipped.
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Layout: by eye; no number depends on it.
 const HIGHEST: f64 = 6.0;
 /// Style class of the score's line: the same colour for every detector, distinct from that of alarms.
 const SCORE: &str = "c0";

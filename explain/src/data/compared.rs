@@ -1,10 +1,13 @@
 //! Selection of the samples of a recording that a joint is fitted to: those whose motion is known.
 
-use crate::data::track::{STANDSTILL_RAD_S, Track};
+use tauscope_dynamics::terms::STANDSTILL_RAD_S;
+
+use crate::data::track::Track;
 use crate::read::recording::{MAX_GAP_S, mean_step_s};
 
 /// Margin at the ends of the recording and at gaps within which samples are excluded, in periods of the cutoff.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Derived: the boundary error of the motion's smoother, with half amplitude at f = 2 cutoffs, decays as exp(-π f t):
+/// to 1 % within 0.73 periods, rounded up.
 const END_PERIODS: f64 = 0.8;
 /// Margin at standstills and reversals of the joint within which samples are excluded, in periods of the cutoff. The
 /// motion does not determine the friction there.

@@ -1,23 +1,23 @@
-//! Efforts over all recordings, unfiltered, from the bodies to what is recorded.
+//! Unfiltered efforts over all recordings, at each layer from the rigid bodies to the recorded signal.
 
 use std::sync::Arc;
 
-/// An effort by track, row-major, one number per joint and sample \[N m or N\].
+/// Efforts by track, each row-major with one number per sample and joint \[N m or N\].
 pub type TrackEfforts = Vec<Vec<f64>>;
 
-/// Efforts of all tracks under some physics, layer by layer.
+/// Efforts of all tracks for a set of effects, by layer.
 #[derive(Debug, Clone)]
 pub struct Efforts {
-    /// Rigid body and [`Layer::Body`] terms: what the gears transmit.
+    /// Effort of the rigid bodies and the [`Layer::Body`] terms, which the gears transmit.
     pub body: Arc<TrackEfforts>,
-    /// With the [`Layer::Joint`] terms.
+    /// `body` with the [`Layer::Joint`] terms, such as friction.
     pub mechanical: Arc<TrackEfforts>,
-    /// With the [`Layer::Record`] terms: what is recorded.
+    /// `mechanical` with the [`Layer::Record`] terms, as the sensor records it.
     pub recorded: Arc<TrackEfforts>,
 }
 
 impl Efforts {
-    /// Under no physics but bodies, of which the gears transmit `body`.
+    /// Creates the efforts without joint and record terms, so that every layer equals `body`.
     pub fn of_bodies(body: Arc<TrackEfforts>) -> Self {
         Self {
             mechanical: Arc::clone(&body),
@@ -27,12 +27,12 @@ impl Efforts {
     }
 }
 
-/// Zero effort, as many numbers as `like` has.
+/// Returns zero efforts in the shape of `like`.
 pub fn zeros(like: &[Vec<f64>]) -> TrackEfforts {
     like.iter().map(|like| vec![0.0; like.len()]).collect()
 }
 
-/// Multiplies the effort of bodies by the torque scales, one per joint.
+/// Multiplies the efforts by the torque scales `gains`, one per joint.
 pub fn scale(bodies: &mut [Vec<f64>], gains: &[f64]) {
     if gains.iter().all(|gain| (gain - 1.0).abs() <= 0.0) {
         return;
@@ -44,7 +44,7 @@ pub fn scale(bodies: &mut [Vec<f64>], gains: &[f64]) {
     }
 }
 
-/// The difference of two efforts.
+/// Returns `from` minus `what`.
 pub fn subtract(mut from: TrackEfforts, what: &[Vec<f64>]) -> TrackEfforts {
     for (from, what) in from.iter_mut().zip(what) {
         for (a, b) in from.iter_mut().zip(what) {

@@ -1,19 +1,19 @@
 //! Comparison of measured and computed efforts: whether they are those of one robot.
 
 use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::terms::STANDSTILL_RAD_S;
 
 use crate::data::problem::Problem;
-use crate::data::track::STANDSTILL_RAD_S;
 
 /// Smallest standard deviation of the twin's effort at a compared joint, in standard deviations of the noise.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const STRONG: f64 = 5.0;
+/// Chosen: noise alone then leaves 1 / 25 of the variance unexplained, less than half of `remedies::SUSPECT`.
+pub(super) const STRONG: f64 = 5.0;
 /// Smallest share of the variance after friction that the scaled effort of the twin explains at a matching joint.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const FOLLOWS: f64 = 0.15;
 /// Smallest number of rows of a compared joint.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const LEAST_ROWS: usize = 20;
+/// Statistical: five rows for each of four coefficients.
+pub(super) const LEAST_ROWS: usize = 20;
 /// Ridge added to the diagonal of the normal equations, relative to their trace.
 /// Resolution: far above the rounding of f64, far below what the noise hides.
 const RIDGE: f64 = 1e-9;

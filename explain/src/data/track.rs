@@ -1,7 +1,7 @@
 //! One recording in a fit: smoothed motion, the twin's effort for it, and the samples that are compared.
 
 use nalgebra::Vector3;
-use tauscope_dynamics::terms::{MotionSample, Physics};
+use tauscope_dynamics::terms::{MotionSample, Physics, STANDSTILL_RAD_S};
 use tauscope_dynamics::{Data, Model, rnea};
 
 use crate::data::quiet_start::quiet_s;
@@ -9,14 +9,11 @@ use crate::data::smoother::{LowPass, MotionSmoother};
 use crate::data::standstill;
 use crate::read::recording::Recording;
 
-/// Speed below which a joint is at standstill: its friction takes any value up to breakaway \[rad/s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-pub const STANDSTILL_RAD_S: f64 = 0.01;
 /// Share of the time with motion below which a joint is compared at standstill, too.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_MOVING_SHARE: f64 = 0.2;
 /// Start of a recording of an arm at rest whose effort is treated as free of temporary effects \[s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: 50 samples at 50 Hz for a standard deviation; a longer start would contain a push more often.
 pub const BEGINNING_S: f64 = 1.0;
 /// Smallest distance of thinned samples on an uneven clock, relative to the step.
 /// Resolution: an uneven clock keeps nearly its samples.

@@ -1,4 +1,4 @@
-//! The search for an arm that moves.
+//! Explanation of recordings in which the arm moves.
 
 use tauscope_dynamics::effort_scale::EffortScale;
 use tauscope_dynamics::terms::{PlaceKind, TermError};
@@ -17,8 +17,8 @@ use crate::physics::{library, torque_scale};
 use crate::report::findings;
 
 impl Context<'_> {
-    /// Infers the effects from the rows in motion. At rest friction may have any value up to its breakaway, so those rows say
-    /// little, and they are left out.
+    /// Infers the effects from the rows in motion. Rows at rest are excluded: static friction may have any value up
+    /// to breakaway, so they contain little information about the other effects.
     pub fn in_motion(
         &self,
         progress: &(dyn Fn(f64, &str) + Sync),
@@ -34,17 +34,17 @@ impl Context<'_> {
         hypotheses.extend(library::unnamed(&input.model, input.bodies, &input.without));
         // Unknown torque scales are fitted before the twin is compared.
         let mut start = torque_scale::unknown_scales(&self.unscaled);
-        // A base that is turned so far that no search in small steps would find it.
+        // A large rotation of the base is a start value, because the local search would not find it.
         let tilt = (hypotheses.iter()).find(|h| h.effect.place == PlaceKind::Base);
         start.extend(tilt.zip(turn).map(|(tilt, turn)| tilt.with(turn.to_vec())));
-        // The number of rounds is not known, so the share stays.
+        // The number of rounds is unknown, so the progress stays at 10 % during the inference.
         let say = |text: &str| progress(0.1, text);
         let inferred = inference::infer(&problem, &hypotheses, start, input.bodies, &say);
         progress(0.8, "wording the findings");
         let before = scaled(&problem, &self.unscaled);
         let named = findings::of(&problem, &inferred, &before, self, &joints);
         let undetectable = findings::undetectable(&inferred.smallest, self, &joints);
-        // A twin that is corrected has the bodies' mean changes, too, which are too small for a finding.
+        // The corrected twin also contains the mean changes of the links, which are too small for a finding.
         let mut actives = inferred.fit.actives;
         if !named.findings.is_empty() {
             add_bodies(&mut actives, inferred.bodies);
@@ -61,7 +61,7 @@ impl Context<'_> {
         }))
     }
 
-    /// The turn of the base that the efforts ask for, if any.
+    /// Returns the rotation of the base that the efforts require, if any, or the reason why they cannot be explained.
     fn remedied(&self, problem: &Problem) -> Result<Option<[f64; 2]>, Stop> {
         let input = self.input;
         if !input.bodies {
@@ -75,7 +75,7 @@ impl Context<'_> {
         if !audit.slips.is_empty() {
             return Err(Stop::Slips(audit.slips));
         }
-        // A scale of each joint is in doubt where one body explains the efforts as well.
+        // Separate scales of the joints are rejected if one wrong body explains the efforts as well.
         let scale = remedies::of_scale(input, &likeness.slopes);
         let scale = scale.filter(|slip| !slip.remedy.is_without(&input.without));
         let is_of_each = |slip: &Slip| slip.remedy.is_of_each_joint();
@@ -85,7 +85,7 @@ impl Context<'_> {
             Some(_) if !scale.as_ref().is_some_and(is_of_each) => return Ok(None),
             _ => {}
         }
-        // A corrected twin was made of this robot, and in its unit.
+        // A corrected twin was identified on this robot and in its unit, so neither can be wrong.
         if input.found_before().is_some() {
             return Ok(None);
         }

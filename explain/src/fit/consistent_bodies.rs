@@ -1,36 +1,38 @@
-//! Bodies that are physically consistent.
+//! Projection of estimated bodies onto physically consistent ones.
 //!
-//! If a motion hardly depends on an inertia, its estimate may have any sign. A body whose pseudo-inertia is not positive
-//! definite (Wensing, Kim and Slotine, "Linear Matrix Inequalities for Physically Consistent Inertial Parameter
-//! Identification", 2018) is replaced by a near one that is.
+//! An inertia that the motion hardly excites may be estimated with the wrong sign. A body whose pseudo-inertia is not
+//! positive definite (Wensing, Kim and Slotine, "Linear Matrix Inequalities for Physically Consistent Inertial
+//! Parameter Identification", 2018) is replaced by a consistent one close to it.
 
 use tauscope_dynamics::kinematic_tree::reach_m;
 use tauscope_dynamics::{Inertia, Model};
 
 use crate::physics::active::{Active, BODY};
 
-/// Least standard deviation of a body's mass distribution in each direction \[m\].
+/// Minimum standard deviation of a corrected body's mass distribution in each direction \[m\].
 /// Physical: that of a compact motor or a gripper's finger.
 const LEAST_SPREAD_M: f64 = 0.015;
-/// A link whose mass would be none keeps this share of its URDF's.
-/// Resolution: far below what recordings distinguish from none.
+/// Fraction of its URDF inertia that a link keeps if its estimated mass is not positive.
+/// Resolution: far below the masses that recordings distinguish from zero.
 const LEAST_SHARE: f64 = 0.1;
-/// A centre may always be this far from its link's frame, however short the arm is \[m\].
+/// Distance of a centre of mass from its link's frame that is plausible on an arm of any size \[m\].
 /// Physical: tools are shorter.
 const LONG_TOOL_M: f64 = 1.0;
 
-/// Replaces bodies that are not physically consistent. Returns whether there were any.
+/// Replaces bodies that are not physically consistent. Returns whether it replaced any.
 pub fn make_consistent(model: &Model, actives: &mut [Active]) -> bool {
     let mut odd = false;
     for active in actives {
         if let Some((body, of_urdf)) = active.body(model) {
             let least_m2 = LEAST_SPREAD_M * LEAST_SPREAD_M;
             let mut nearest = body.nearest_consistent(least_m2);
-            // A motion that shows the mass alone may leave the centre anywhere, and no step comes back from there.
+            // A motion that excites only the mass leaves the centre of mass undetermined. Later steps of the fit do
+            // not bring a centre back that has left the arm's reach.
             let from_link_m = nearest.com_m().iter().map(|x| x * x).sum::<f64>().sqrt();
             let farthest_m = reach_m(model, active.hypothesis.place.link).max(LONG_TOOL_M);
             if of_urdf.is_none() && from_link_m > farthest_m {
                 let mass = nearest.mass_kg();
+                // A variance σ² in each direction gives the principal moments I = 2 m σ².
                 let moment = 2.0 * mass * least_m2;
                 nearest = Inertia::new(mass, [0.0; 3], [moment, 0.0, 0.0, moment, 0.0, moment]);
             }

@@ -16,7 +16,7 @@ const SYSTEMATIC: f64 = 0.003;
 /// Tuned: on arms simulated by another engine, on no recorded seeds; not swept.
 const SYSTEMATIC_WHEN_FAST: f64 = 0.02;
 /// Distance from a gap below which a change may lie within the gap, in periods of the cutoff.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: half a period of the cutoff is what the comparison resolves in time.
 const NEAR_GAP_PERIODS: f64 = 0.5;
 /// Half width of a 95 % interval of a normal variable, in standard deviations.
 /// Statistical: the 97.5 % quantile of the standard normal distribution.

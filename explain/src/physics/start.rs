@@ -1,4 +1,4 @@
-//! The physics of the corrected twin that an explanation starts from. New effects are reported in addition to it.
+//! Effects of the corrected twin from which an explanation starts. New effects are reported in addition to them.
 
 use std::collections::BTreeMap;
 
@@ -10,8 +10,8 @@ use crate::physics::friction;
 use crate::read::start::Start;
 
 impl Start {
-    /// Returns Coulomb and viscous friction by joint and name, in units of its terms. They may have decreased by up
-    /// to this since.
+    /// Returns the plain friction and rotor inertia that the twin contains, by joint and effect name, in the units of
+    /// its terms. A fit may reduce each by at most this value.
     pub fn friction(&self, model: &Model) -> Vec<BTreeMap<&'static str, f64>> {
         let mut all = vec![BTreeMap::new(); model.dof()];
         for spec in &self.terms {
@@ -24,9 +24,9 @@ impl Start {
     }
 
     /// Adds the twin's bodies to the rigid effort of a track, and stores the effort of its other terms separately, so
-    /// that a new body has the same scale as the old ones. `loads` are new bodies that the gears bear, too.
-    /// `constants` convert the recording's unit into the model's. `gain` is each joint's factor on the effort of
-    /// bodies, from the model's unit into the recording's.
+    /// that a new body has the same scale as the old ones. `loads` are new bodies, which also load the gears.
+    /// `constants` convert the recording's unit into the model's, by joint. `gain` converts the effort of bodies from
+    /// the model's unit into the recording's, by joint.
     ///
     /// # Errors
     /// If a term cannot be built for the robot.
@@ -50,6 +50,7 @@ impl Start {
         let borne = run(track, &loads.iter().collect::<Vec<_>>(), &track.rigid)?;
         let scaled = borne.iter().enumerate();
         let effort: Vec<f64> = scaled.map(|(k, x)| x * self.gain[k % n]).collect();
+        // All effort that the twin predicts except the scaled effort of the bodies, which the fit adds itself.
         track.beside = run(track, &beside, &effort)?;
         for (k, value) in track.beside.iter_mut().enumerate() {
             let j = k % n;

@@ -1,31 +1,31 @@
-//! Intervals of a log that are searched for a temporary effect.
+//! Intervals of a recording that are searched for a temporary effect.
 
-/// Number of steps per recording on which changes are searched. Intervals have more steps in long recordings.
+/// Number of steps into which a recording is divided to search for changes; searches of intervals may use more.
 /// Resolution: times are refined afterwards.
 pub const STEPS: usize = 100;
-/// Length in steps above which intervals of a recording with more than [`STEPS`] steps are searched at twice the
-/// step. So the shortest intervals are found in a log of any length, and the work grows at most linearly with the
-/// log.
+/// Longest interval on the finest grid, in steps, in a recording of more than [`STEPS`] steps. Longer intervals are
+/// searched on grids whose step doubles with their length. The shortest intervals are thus found in any
+/// recording, and the work grows at most linearly with its length.
 /// Resolution: the ends of an interval are searched to within a twentieth of its length.
 const FINE_STEPS: usize = 40;
 /// An interval in steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Steps {
-    /// First step.
+    /// First step of the interval.
     pub from: usize,
-    /// Step after the last one.
+    /// First step after the interval.
     pub to: usize,
 }
 
 impl Steps {
-    /// Whether both contain a common step.
+    /// Returns whether both intervals contain a common step.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.from < other.to && other.from < self.to
     }
 }
 
-/// Returns the searched intervals of at least `shortest` steps among `steps`: all if there are few steps, otherwise
-/// longer ones on a coarser grid.
+/// Returns the searched intervals of at least `shortest` steps in a recording of `steps` steps: all intervals of a
+/// short recording; in a long one, longer intervals only on a coarser grid.
 pub fn intervals(steps: usize, shortest: usize) -> Vec<Steps> {
     let mut all = Vec::new();
     let mut stride = 1;
@@ -40,6 +40,8 @@ pub fn intervals(steps: usize, shortest: usize) -> Vec<Steps> {
             let ends = ends.take_while(|to| *to <= steps);
             all.extend(ends.map(|to| Steps { from, to }));
         }
+        // Lengths of 21 to 40 strides: the next grid begins where this one ends, and a length is at least 21 times
+        // its grid step. For a short recording, the loop ends here.
         stride *= 2;
         lengths = lengths.end() / 2 + 1..=*lengths.end();
     }

@@ -1,5 +1,5 @@
-//! The wall for Prometheus, in the format `OpenMetrics`. Names have base units; `deploy/` has a dashboard and alert
-//! rules for them.
+//! Metrics of all cells for Prometheus, in the `OpenMetrics` format. Metric names contain base units. `deploy/`
+//! contains a dashboard and alert rules for them.
 
 use axum::extract::State as Extract;
 use axum::http::{StatusCode, header};
@@ -54,7 +54,7 @@ struct CellInfo {
 
 type Reals<L> = Family<L, Gauge<f64, std::sync::atomic::AtomicU64>>;
 
-/// All families, empty at first.
+/// Metric families of one response.
 #[derive(Default)]
 struct Families {
     state: Family<CellState, Gauge>,

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use tauscope_record::{Existing, FileName};
 
-/// A recorder's configuration for a replay: the same kinds of file, written to `out` and named after the recording,
-/// without live picture. `None` without `out`.
+/// Returns a recorder's configuration for a replay: the same kinds of file, written to `out` and named after the
+/// recording, without a connection to a live viewer. `None` without `out`.
 pub(super) fn redirect(
     config: &tauscope_record::Config,
     out: Option<&Path>,
@@ -18,7 +18,7 @@ pub(super) fn redirect(
         split: None,
         keep: None,
         existing: Existing::Replace,
-        // Files lost in a power failure can be replayed again.
+        // No periodic sync: another replay restores files that a power failure destroyed.
         sync_s: 0.0,
         ..config.clone()
     };

@@ -9,7 +9,8 @@ pub use file::StateFile;
 
 use crate::detectors::{DETECTORS, Entry};
 use crate::frame::{
-    AnySettings, ConfigError, Detect, Detector, DetectorSettings, Setup, State, Threshold,
+    AnySettings, ConfigError, DEFAULT_HOLD_S, Detect, Detector, DetectorSettings, Setup, State,
+    Threshold,
 };
 
 /// The key of the learnt state in a detector's settings.
@@ -41,8 +42,7 @@ impl Default for Config {
         Self {
             detectors: Given::default(),
             threshold: Threshold::default(),
-            // Bridges the dip of the score between two oscillations of one contact.
-            hold_s: 0.1,
+            hold_s: DEFAULT_HOLD_S,
         }
     }
 }

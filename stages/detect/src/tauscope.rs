@@ -25,8 +25,9 @@
 //! along the link (Haddadin, De Luca and Albu-Schäffer, "Robot Collisions: A Survey on Detection, Isolation, and
 //! Identification", 2017, sections V and VI).
 //!
-//! The last sentence of a constant's doc comment says where its value comes from: `Physical:` a source,
-//! `Statistical:` a derivation, `Tuned:` the data. Constants tuned "on the sets named in `tauscope`" were chosen with
+//! The last sentences of a constant's doc comment say where its value comes from. `Physical:` names a source,
+//! `Statistical:` and `Derived:` a derivation, `Chosen:` a reason, `Resolution:` a limit of accuracy or computing
+//! time, and `Tuned:` the data. Constants tuned "on the sets named in `tauscope`" were chosen with
 //! simulated sets in view. These sets were drawn by `tests/contacts/assembly.py` and `tests/contacts/paths.py` with
 //! the seeds 301 to 323, 401 to 406, 432 to 434, 451 to 456 and 501 to 508, and judged by
 //! `tauscope evaluate set.yaml --out results --detectors tauscope`. The sensitivity of the results to these constants
@@ -84,10 +85,10 @@ pub(crate) const NAME: &str = "tauscope";
 /// State of a contact that is not classified.
 const UNTOLD: &str = "contact";
 /// Time by which a contact precedes its threshold crossing; the rise of the residual is measured from there \[ns\].
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope), with kinds reported; not swept.
 const FELT_NS: i64 = 3_000_000;
 /// Window before the threshold crossing over which the joint velocities are averaged, as (start, end) \[ns\].
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope), with kinds reported; not swept.
 const MOVED_NS: [i64; 2] = [28_000_000, 7_000_000];
 /// Number of samples for which the joint velocities are kept.
 /// Physical: holds the 28 ms of [`MOVED_NS`] up to 4.5 kHz; arms are read at 1 kHz and less.

@@ -16,7 +16,7 @@ use tauscope_detect::{
 };
 use tauscope_dynamics::Model;
 
-/// Two joints in a row.
+/// Planar arm with two parallel joint axes.
 const ARM: &str = r#"<robot name="arm">
   <link name="base"/>
   <link name="upper"><inertial><origin xyz="0 0 0.25"/><mass value="2"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
@@ -43,8 +43,8 @@ fn setup() -> Setup {
     setup_of(ARM)
 }
 
-/// Returns samples at 100 Hz of a swinging arm with friction that its twin does not model. From sample 900 to 930,
-/// joint b is pushed with `push` \[N m\].
+/// Returns samples at 100 Hz of a swinging arm with friction that its twin does not model. A contact pushes joint b
+/// with `push` \[N m\] from sample 900 to 930.
 fn swing(samples: i64, phase: f64, push: f64) -> Vec<TwinState> {
     let state = |i: i64| {
         let t = i as f64 * 0.01;

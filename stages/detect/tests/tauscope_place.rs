@@ -1,4 +1,4 @@
-//! `tauscope`: joints and link of a contact are determined from all its samples.
+//! Detector `tauscope`: it determines joints and link of a contact from all samples of the contact.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -13,7 +13,7 @@ use tauscope_dynamics::{Data, Model, forward_kinematics, point_jacobian};
 const JOINTS: usize = 4;
 const STEP_NS: i64 = 10_000_000;
 const POSTURE: [f64; JOINTS] = [0.4, 0.8, 0.6, 0.3];
-/// Samples of the contact.
+/// Indices of the samples with contact.
 const CONTACT: std::ops::Range<usize> = 1000..1060;
 
 /// An arm with links of half a metre and a short hand.
@@ -47,8 +47,8 @@ fn quiet(seed: u64, samples: usize) -> Vec<TwinState> {
     (0..samples).map(sample).collect()
 }
 
-/// Returns the detected contact for a push of 25 N on the forearm, with this extra effort of the last joint in the
-/// contact's sample `k` \[N m\].
+/// Returns the contact detected for a push of 25 N on the forearm. Adds `extra_nm` to the effort of the last joint in
+/// sample `k` of the contact \[N m\].
 fn contact(extra_nm: impl Fn(usize) -> f64) -> Contact {
     let model = Model::from_urdf(ARM).unwrap();
     let cell = Setup {

@@ -9,6 +9,7 @@ use tauscope_dynamics::derivative::FilteredDerivative;
 
 use crate::config::{Config, FileConfig, Topics};
 use crate::error::IngestError;
+use crate::pack::MAX_GAP_NS;
 use crate::recorded::RecordedSource;
 use crate::setup::Setup;
 
@@ -18,9 +19,6 @@ const LOOK_AHEAD: usize = 256;
 /// Number of samples emitted per step.
 /// Resolution: latency of a stop, against the cost of a step.
 const SAMPLES_PER_STEP: usize = 16;
-/// Longest gap between samples across which the acceleration is differentiated \[ns\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-const MAX_GAP_NS: i64 = 250_000_000;
 
 /// Topics of a twin in an archive.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -16,7 +16,7 @@ const LONGEST_SLEEP: Duration = Duration::from_millis(50);
 /// Resolution: half a sample at 1 kHz. 150 cells need two interrupts a millisecond instead of 150.
 const SLACK_NS: u64 = 500_000;
 /// Longest gap in the stamps that is waited out \[ns\]; a longer one is skipped.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: a pause of the robot within a session is waited out; a longer one is a break between sessions.
 const LONGEST_PAUSE_NS: i64 = 60_000_000_000;
 
 /// A source that emits the samples of another in step with their stamps.

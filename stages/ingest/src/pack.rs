@@ -19,6 +19,7 @@ use tauscope_session::{Assembler, Counts, Finding, Gather, Layouts, Taken, Whole
 use crate::config::ConfigError;
 use crate::setup::{Setup, Tool};
 use differentiate::Differentiator;
+pub(crate) use differentiate::MAX_GAP_NS;
 use refused::Reported;
 pub use settings::PackSettings;
 use side::Side;

@@ -4,7 +4,7 @@
 
 #![allow(
     clippy::unwrap_used,
-    reason = "a measurement that cannot go on is none"
+    reason = "a failed set-up is a failed measurement"
 )]
 
 #[path = "../tests/common/mod.rs"]

@@ -6,8 +6,8 @@ use crate::streams::Streams;
 /// Resolution: reordering without a clock step stays below this.
 const SET_BACK_NS: i64 = 1_000_000_000;
 
-/// Detector of a clock that was set back. Each stream is compared only with itself: after a network failure a stream
-/// of another host may be late although no clock was set back.
+/// Detector of a clock that was set back. Each stream is compared only with itself, because after a network failure
+/// the stream of another host may be late without a clock step.
 #[derive(Debug)]
 pub(crate) struct SetBack {
     /// Reception time of the newest sample \[ns since the epoch\] and number of clock steps in the stream, by stream.
@@ -33,6 +33,7 @@ impl SetBack {
         if back_ns <= SET_BACK_NS {
             return None;
         }
+        // Every stream sees the same step; only the first one reports it.
         *times += 1;
         let is_first = *times > self.times;
         self.times = self.times.max(*times);

@@ -1,4 +1,4 @@
-//! The picture can be read back, and a missing viewer has no effect.
+//! Tests of the files for the Rerun viewer, read back with Rerun's decoder, and of a viewer that is missing.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -33,7 +33,7 @@ fn to_file(path: &Path) -> RerunConfig {
     }
 }
 
-/// The chunks of the recording by entity, and the paths of the blueprint.
+/// Returns the chunks of the recording by entity, and the entity paths of the blueprint.
 fn read(path: &Path) -> (BTreeMap<String, Vec<Chunk>>, BTreeSet<String>) {
     let reader = BufReader::new(File::open(path).unwrap());
     let (mut recording, mut blueprint) = (BTreeMap::<_, Vec<_>>::new(), BTreeSet::new());
@@ -52,7 +52,7 @@ fn read(path: &Path) -> (BTreeMap<String, Vec<Chunk>>, BTreeSet<String>) {
     (recording, blueprint)
 }
 
-/// The whole blueprint as text.
+/// Returns the blueprint as text.
 fn blueprint_text(path: &Path) -> String {
     let reader = BufReader::new(File::open(path).unwrap());
     let mut text = String::new();

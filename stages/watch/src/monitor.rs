@@ -15,10 +15,11 @@ use super::window::Window;
 use contact::{Run, Told};
 
 /// Blocks that are judged before they are learned from: 16 s of motion.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: holds the latest report, 18 blocks, and the 8 blocks before its onset; many more would let slow drift look
+/// like a change.
 const FRESH: usize = 32;
 /// Minimum size of a reported deviation, as a share of the joint's root-mean-square effort.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: about the accuracy of effort sensors; less would report their drift, more would hide wear.
 const LEAST_SHARE: f64 = 0.01;
 /// Share of a joint's known range by which a motion must exceed the range to be novel.
 /// Tuned: by hand, on no recorded seeds; not swept.

@@ -13,14 +13,15 @@ use super::Setup;
 use super::moments::JointRow;
 
 /// Averaging time of a row \[ns\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-const ROW_NS: i64 = 50_000_000;
+/// Derived: the Nyquist frequency of 20 rows a second is twice the cutoff of the twin's low-pass, 4.5 Hz by default.
+/// Fewer rows would alias the residual; more only cost computing time.
+pub(super) const ROW_NS: i64 = 50_000_000;
 /// Gap between two rows above which the low-passes are reset \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LONGEST_GAP_S: f64 = 1.0;
 /// Speed below which a revolute joint is at standstill: its friction may have any value within its limits \[rad/s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-const STANDSTILL_RAD_S: f64 = 0.02;
+/// Chosen: twice the standstill of single samples, because the velocity varies within a row.
+const STANDSTILL_RAD_S: f64 = 2.0 * tauscope_dynamics::terms::STANDSTILL_RAD_S;
 /// Speed below which a prismatic joint is at standstill \[m/s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const STANDSTILL_M_S: f64 = 0.005;

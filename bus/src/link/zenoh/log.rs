@@ -15,7 +15,7 @@ const AGAIN_AFTER: Duration = Duration::from_millis(500);
 /// Upper bound on the retransmission timeout.
 const AGAIN_AT_MOST: Duration = Duration::from_secs(4);
 /// Longest time a pausable sender waits for a disconnected receiver.
-/// Tuned: by hand, on no recorded seeds; not swept. Longer than a switch takes to restart.
+/// Chosen: longer than a switch takes to restart; a longer wait stops the source for a receiver that may not return.
 const RETURN_WITHIN: Duration = Duration::from_mins(1);
 
 /// An unacknowledged sample, and the number of samples lost right before it.

@@ -1,33 +1,33 @@
-//! Detection of efforts with a common scale error, in another unit, or divided by wrong torque constants.
+//! Detection of efforts in another unit, with a common scale error, or with wrong torque constants.
 
 use tauscope_dynamics::effort_scale::EffortScale;
 
 use super::{Remedy, Slip};
 use crate::read::input::Input;
 
-/// Largest factor between the slope of a joint and the median slope of an arm with a common scale.
+/// Largest ratio of a joint's slope to the median slope, in either direction, for the joints to have a common scale.
 /// Physical: masses of published URDFs are within a tenth of the real ones, and a gravity torque sums several.
 const SAME: f64 = 1.2;
-/// Largest factor from the median slope where a body that the URDF lacks could explain the scale.
-/// Physical: a payload loads each joint by a different share of its load without it.
+/// Stricter bound in place of [`SAME`] for a scale near 1, which a body missing in the URDF could also explain.
+/// Physical: a payload increases the load of each joint by a different fraction.
 const SAME_NEAR_1: f64 = 1.1;
-/// Smallest distance of a common scale from 1, as a factor: errors in the masses of an arm are smaller.
-/// Physical: as [`SAME`]; all bodies of an arm are not wrong by a third in the same direction.
+/// Smallest ratio of a common scale to 1, in either direction, that is not explained by wrong masses.
+/// Physical: as [`SAME`]; the masses of an arm are not all wrong by a third in the same direction.
 const OFF: f64 = 1.4;
-/// Smallest number of joints with the same scale.
-/// Physical: one joint's factor is that of its own drive.
+/// Minimum number of joints for a common scale.
+/// Physical: the factor of a single joint may be a fault of its drive.
 const LEAST_JOINTS: usize = 2;
 /// Smallest ratio of measured to required torque, at every joint, of an effort relative to a rating.
-/// Physical: per cent and per mille of ratings up to 1000 N m are above it.
+/// Physical: per mille of ratings up to 333 N m, and per cent of ratings up to 33 N m, are above it.
 const LEAST_RATING: f64 = 3.0;
-/// Smallest such ratio where fewer than [`LEAST_JOINTS_NEAR_1`] joints are informative.
+/// Bound in place of [`LEAST_RATING`] if fewer than [`LEAST_JOINTS_NEAR_1`] joints are informative.
 /// Physical: no arm carries ten times its own weight.
 const RATING_OF_FEW: f64 = 10.0;
-/// Smallest number of joints with the same scale where a wrong body could explain it.
-/// Physical: a wrong mass of the last link weighs on two joints alike.
+/// Minimum number of joints for a common scale near 1, which a wrong body could also explain.
+/// Physical: a wrong mass of the last link can load two joints by the same factor.
 const LEAST_JOINTS_NEAR_1: usize = 3;
 
-/// Returns the fault of the scale of efforts, given the slope of measured over required effort by informative joint.
+/// Returns the fault of the efforts' scale, from the slope of measured over required effort by informative joint.
 pub fn of_scale(input: &Input, slopes: &[(usize, f64)]) -> Option<Slip> {
     let mut sorted: Vec<f64> = slopes.iter().map(|(_, slope)| *slope).collect();
     sorted.sort_by(f64::total_cmp);
@@ -40,11 +40,13 @@ pub fn of_scale(input: &Input, slopes: &[(usize, f64)]) -> Option<Slip> {
         scale,
         EffortScale::Current { .. } | EffortScale::TooLarge { .. }
     );
+    // Within a factor of 3 of 1 a wrong body could explain the scale, so more joints must agree more closely.
     let is_off = off(1.0)(&middle) > OFF.ln();
     let near_1 = is_off && sorted.len() >= LEAST_JOINTS_NEAR_1 && is_same(SAME_NEAR_1);
     let common_off = common && (wrong || near_1);
     let in_amperes = input.effort_unit == "A";
     let remedy = match (in_amperes, input.torque_constants_nm_per_a.is_some()) {
+        // Declared as a current, but the slope is that of a torque in N m.
         (true, false) => (common && !is_off).then_some(Remedy::IsTorque),
         (true, true) if common_off => Some(Remedy::ConstantsScaled(1.0 / middle)),
         (true, true) => wrong.then_some(Remedy::ConstantsWrong),

@@ -4,19 +4,15 @@ mod base_turned;
 mod without_sign;
 
 use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::terms::STANDSTILL_RAD_S;
 use tauscope_dynamics::{Data, Inertia, Link, Model, rnea};
 
 use super::{Reading, Remedy, SUSPECT};
 use crate::data::efforts::TrackEfforts;
 use crate::data::problem::Problem;
-use crate::data::track::STANDSTILL_RAD_S;
+use crate::data::same_robot::{LEAST_ROWS, STRONG};
 use crate::data::track::Track;
 
-/// Smallest variation of the effort of an informative joint, in standard deviations of the noise, and its smallest
-/// number of compared rows.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const STRONG: f64 = 5.0;
-const LEAST_ROWS: usize = 20;
 /// Bounds of measured over required torque: gain errors of sensors and wrong bodies.
 /// Physical: as `effort_scale::SURE_SCALE`.
 const GAINS_OF_TORQUE: [f64; 2] = [0.5, 2.0];

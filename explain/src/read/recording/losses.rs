@@ -1,4 +1,4 @@
-//! Losses of a recording on reading.
+//! Rows of a recording that are left out on reading.
 
 use super::Recording;
 
@@ -7,11 +7,11 @@ use super::Recording;
 pub struct Losses {
     /// Refused messages and states; the findings state the reasons.
     pub refused: u64,
-    /// Rows that repeat the stamp and the values of the row before.
+    /// Rows that repeat the stamp and all values of the preceding row.
     pub repeated: u64,
-    /// Rows of a moving arm that repeat all values of the row before: an old measurement.
+    /// Rows of a moving arm that repeat all values of the preceding row with a new stamp.
     pub stale: u64,
-    /// Rows whose efforts are not a measurement, in a recording with measured efforts.
+    /// Rows without a measured effort, in a recording with measured efforts.
     pub unmeasured: u64,
     /// Messages that could not be decoded.
     pub unreadable: u64,
@@ -20,23 +20,23 @@ pub struct Losses {
 }
 
 impl Losses {
-    /// Returns the number of lost rows of data, without repeats.
+    /// Returns the number of lost rows; repeated and stale rows are not lost.
     pub fn lost(&self) -> u64 {
         self.refused + self.unmeasured + self.unreadable + self.damaged
     }
 }
 
 impl Recording {
-    /// Removes the samples that are not `measured`, because their efforts are not a measurement.
+    /// Removes the samples whose efforts are not `measured`.
     pub(super) fn keep_measured(&mut self, measured: &[bool]) {
         let unmeasured = measured.iter().filter(|is_measured| !**is_measured);
         self.losses.unmeasured += unmeasured.count() as u64;
         self.keep(measured);
     }
 
-    /// Removes the samples that repeat every value of the one before although some joint has a velocity. A driver
-    /// that publishes faster than it reads sends old measurements with new stamps. A position that stops and then
-    /// catches up implies a velocity that the arm did not have.
+    /// Removes the samples that repeat all values of the preceding one although a joint has a velocity. A driver that
+    /// publishes faster than it reads sends old measurements with new stamps. Their position would stop and then
+    /// catch up, which differentiates to a velocity that the arm did not have.
     pub(super) fn leave_out_stale(&mut self) {
         let count = self.len();
         let n = self.position.len() / count.max(1);
@@ -59,7 +59,7 @@ impl Recording {
         }
     }
 
-    /// Splits the recording at a time \[s\] into two. Findings and losses are those of the first.
+    /// Splits the recording at the time `at_s` \[s\]. The first part keeps the findings and losses.
     pub(crate) fn parted(mut self, at_s: f64) -> (Self, Self) {
         let is_late: Vec<bool> = self.time_s.iter().map(|time_s| *time_s >= at_s).collect();
         let of = |recording: &mut Self, late: bool| {
@@ -76,7 +76,7 @@ impl Recording {
         (self, end)
     }
 
-    /// Removes the samples that are not kept. The sample before represents their rows.
+    /// Removes all samples except `is_kept`. Rows of a removed sample refer to the last kept sample before it.
     pub(crate) fn keep(&mut self, is_kept: &[bool]) {
         let n = self.position.len() / is_kept.len().max(1);
         let kept: Vec<usize> = (0..is_kept.len()).filter(|&k| is_kept[k]).collect();

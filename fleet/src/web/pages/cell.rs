@@ -12,11 +12,11 @@ use crate::store::{Day, Incident, JointNormal, KeptContact, KeptLabel, Note};
 use crate::wall::{CellView, Snapshot, State};
 use crate::words;
 
-/// Days of history that are shown. Resolution: six weeks.
+/// Number of days of history on the page. Resolution: six weeks.
 const DAYS: i64 = 42;
 const DAY_NS: i64 = 86_400_000_000_000;
 const MOST: u32 = 50;
-/// Margin of the archive before and after a contact \[ns\]. Resolution: the motion that led there.
+/// Margin of the archive before and after a contact \[ns\]. Resolution: includes the motion that led to the contact.
 const AROUND_NS: i64 = 5_000_000_000;
 
 /// Stored data of a cell; empty without a store.
@@ -69,7 +69,7 @@ impl Kept {
 /// The page of the cell `name`, which is in the snapshot.
 pub fn page(viewer: &Viewer, snapshot: &Snapshot, name: &str, kept: &Kept) -> Markup {
     let Some(view) = snapshot.cell(name) else {
-        return super::not_found(viewer, "this cell is not here any more");
+        return super::not_found(viewer, "this cell is no longer known to the fleet host");
     };
     let status = view.status.as_ref();
     let unit = status.map_or("", |status| status.effort_unit.as_str());
@@ -77,7 +77,7 @@ pub fn page(viewer: &Viewer, snapshot: &Snapshot, name: &str, kept: &Kept) -> Ma
         p.path { a href="/" { "Wall" } " / " (name) }
         h1 { (name) }
         p #lost role="alert" hidden {
-            strong { "This page is cut off from the fleet host." } " What it shows is old."
+            strong { "The connection to the fleet host is lost." } " The data on this page is outdated."
         }
         div.top {
             div #tile data-cell=(name) { (tile::tile(view, snapshot.now_ns)) }

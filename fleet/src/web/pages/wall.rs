@@ -11,13 +11,13 @@ pub fn page(viewer: &Viewer, snapshot: &Snapshot) -> Markup {
     let content = html! {
         h1.quiet { "The wall" }
         p #lost role="alert" hidden {
-            strong { "This page is cut off from the fleet host." } " What it shows is old."
+            strong { "The connection to the fleet host is lost." } " The data on this page is outdated."
         }
         div #summary { (summary(snapshot)) }
         p #said.quiet role="status" aria-live="polite" {}
         @if snapshot.cells.is_empty() {
-            p #empty { "No cell has been seen yet. A cell is seen once its pipeline has a " code { "publish" }
-                " stage with " code { "zenoh" } " that meets the router of this host." }
+            p #empty { "No cell has connected yet. A cell appears once its pipeline has a " code { "publish" }
+                " stage with " code { "zenoh" } " that connects to the router of this host." }
         }
         section #tiles aria-label="Cells, the worst first" {
             @for view in &snapshot.cells {
@@ -42,10 +42,10 @@ pub fn summary(snapshot: &Snapshot) -> Markup {
             }
         }
         @if snapshot.sessions_reached == 0 {
-            p.refused role="alert" { strong { "This fleet host reaches no router and no cell." } " Nothing here is fresh." }
+            p.refused role="alert" { strong { "This fleet host has no connection to a router or cell." } " This page is outdated." }
         }
         @if let Some(why) = &snapshot.unkept {
-            p.refused role="alert" { strong { "Incidents and history are not kept now." } " " (why) }
+            p.refused role="alert" { strong { "Incidents and history are currently not stored." } " " (why) }
         }
         @if refused > 0 {
             details.muted {

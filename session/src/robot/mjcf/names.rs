@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use mjcf_rs::{BodyId, Model};
 
-/// Names of all bodies and joints, which MuJoCo allows to be missing.
+/// Names of all bodies and joints. MuJoCo does not require a name; an unnamed part gets a generated one.
 pub struct Names {
     pub bodies: Vec<String>,
     pub joints: BTreeMap<(BodyId, usize), String>,

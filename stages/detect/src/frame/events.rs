@@ -13,6 +13,11 @@ pub(crate) enum Step {
     Offset,
 }
 
+/// Default time for which a score must stay below the threshold before an alarm ends \[s\].
+/// Chosen: bridges the dip of the score between two oscillations of one contact. A shorter time splits a contact, a
+/// longer one merges two.
+pub(crate) const DEFAULT_HOLD_S: f64 = 0.1;
+
 /// The alarm's state.
 #[derive(Debug)]
 pub(crate) struct Alarm {

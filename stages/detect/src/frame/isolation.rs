@@ -15,7 +15,8 @@ use super::setup::Setup;
 
 /// Damping of the least-squares force, relative to the trace of its information matrix: directions that no
 /// joint senses stay at zero instead of unbounded.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: halves a force along a direction with a hundredth of the information, and lowers an evenly sensed force by
+/// 3 %. Less damping turns noise into force near singular poses, more underestimates every force.
 const DAMPING: f64 = 1e-2;
 
 /// Location and force of a contact.

@@ -6,6 +6,13 @@ use tauscope_bus::{TwinState, flags};
 
 use super::setup::Setup;
 
+/// Longest time by which a detection may precede the start of its contact \[ns\].
+/// Derived: `TOLERANCE_S` of the evaluation, so that a detector learns from the contacts that count as found there.
+pub(crate) const MATCH_BEFORE_NS: i64 = 20_000_000;
+/// Longest time by which a detection may follow the end of its contact \[ns\].
+/// Derived: `AFTER_S` of the evaluation, likewise.
+const MATCH_AFTER_NS: i64 = 150_000_000;
+
 /// The recordings that a detector learns from.
 #[derive(Debug, Clone, Copy)]
 pub struct Lessons<'a> {
@@ -68,6 +75,14 @@ pub struct LabelledContact {
     pub kind: ContactKind,
     /// Whether it is too weak to be counted as detected or missed.
     pub ignore: bool,
+}
+
+impl LabelledContact {
+    /// Returns whether a detection at this instant \[ns since the epoch\] may belong to the contact. Of several such
+    /// contacts, it belongs to the one that started last.
+    pub(crate) fn matches(&self, stamp_ns: i64) -> bool {
+        (self.on_ns - MATCH_BEFORE_NS..=self.off_ns + MATCH_AFTER_NS).contains(&stamp_ns)
+    }
 }
 
 /// Kind of a contact.

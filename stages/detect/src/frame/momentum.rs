@@ -7,18 +7,17 @@
 //! ```
 //!
 //! τ is the motors' measured effort. n is the twin's effort without the inertial part:
-//! `expected_effort - M(q) q̈` with the twin's own q̈. So n contains every correction of the twin (friction, a
-//! payload, an offset), and ṗ replaces the twin's delayed acceleration in the result. Only a correction of
-//! *inertia* still uses the twin's acceleration.
+//! `expected_effort - M(q) q̈` with the twin's own q̈. n therefore contains every correction of the twin (friction, a
+//! payload, an offset), while ṗ replaces the twin's low-passed, delayed acceleration. Only a correction of *inertia*
+//! still uses the twin's acceleration.
 //!
 //! Differentiated, the observer is a low-pass, `ṙ = K (ṗ - Ṁ q̇ - τ + n - r)`. By the product rule
 //! `ṗ - Ṁ q̇` over a step is the mean mass matrix times the change of velocity; with the input constant
 //! over the step, the step is solved exactly, so that samples may be unevenly spaced and no integral drifts.
-//! The mass matrix itself is not needed, only its product with the rate of change of the velocity less q̈,
-//! at either end of the step.
+//! The mass matrix is never formed: only its product with Δq̇/Δt - q̈ is computed, at both ends of the step.
 //!
-//! Sign: the measured effort is the motors'. It exceeds the twin's effort by unmodelled friction and the like minus
-//! Jᵀ F, with F the force on the robot; at rest the result is minus the residual.
+//! Sign: with the force F on the robot, the measured effort minus the twin's effort is the unmodelled effort (such as
+//! friction) minus Jᵀ F. At rest the estimate is therefore minus the residual.
 
 pub(crate) mod gain;
 
@@ -41,10 +40,10 @@ pub struct MomentumObserver {
     inertia: Tap<Inertia>,
     /// N m per effort unit by joint; 0 where unknown.
     nm_per_effort: Vec<f64>,
-    /// Stamp of the previous sample, and its τ less the twin's expected effort \[N m\].
+    /// Stamp of the previous sample, and its measured minus its expected effort \[N m\].
     before_ns: Option<i64>,
     excess: JointArray,
-    /// Step \[s\], and the low-pass coefficient for it; cached, because steps are often equal.
+    /// Time step \[s\] and its low-pass coefficient; cached, because steps are often equal.
     step: (f64, f64),
     /// Estimate by joint \[N m\].
     torque_nm: JointArray,
@@ -94,7 +93,7 @@ impl MomentumObserver {
         self.update_beside(sample, &sample.expected_effort)
     }
 
-    /// [`MomentumObserver::update`] with the `expected_effort` of another twin.
+    /// Does the same as [`MomentumObserver::update`] with the `expected_effort` of another twin.
     pub fn update_beside(
         &mut self,
         sample: &TwinState,
@@ -108,15 +107,18 @@ impl MomentumObserver {
         }
         let dt_s = before_ns.map(|before_ns| (stamp_ns - before_ns) as f64 * 1e-9);
         if let Some(dt_s) = dt_s.filter(|dt_s| dt_s.to_bits() != self.step.0.to_bits()) {
+            // 1 - exp(-K Δt), without cancellation where K Δt is small.
             self.step = (dt_s, -(-self.gain_per_s * dt_s).exp_m1());
         }
         let inertial_nm = self.inertia.with(|inertia| inertia.update(sample));
         for j in (0..n).filter(|&j| self.nm_per_effort[j] != 0.0) {
             let excess = (sample.effort[j] - expected_effort[j]) * self.nm_per_effort[j];
             let before = std::mem::replace(&mut self.excess[j], excess);
+            // ṗ - Ṁ q̇ - τ + n = M (Δq̇/Δt - q̈) - (τ - expected_effort), averaged over the step.
             let input = inertial_nm[j] - 0.5 * (excess + before);
             self.torque_nm[j] += self.step.1 * (input - self.torque_nm[j]);
         }
+        // The first sample has no step: the loop above only stores its excess.
         if dt_s.is_none() {
             self.torque_nm = [0.0; MAX_JOINTS];
             self.started_ns = stamp_ns;

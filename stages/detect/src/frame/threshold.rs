@@ -10,8 +10,8 @@ use super::setup::Setup;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Threshold {
-    /// Threshold in standard deviations above the mean score on contact-free data; `twin.yaml` has both. Default: 4;
-    /// for `momentum_observer` 3.
+    /// Threshold in standard deviations above the mean score. Both are measured on contact-free data and read from
+    /// `twin.yaml`. Default: 4; for `momentum_observer` 3.
     #[schemars(range(min = 0.0, max = 1000.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigmas: Option<f64>,

@@ -1,6 +1,7 @@
 //! Beginning and end of an alarm, from the score.
 
 use super::windows::Windows;
+use crate::frame::DEFAULT_HOLD_S;
 
 /// Share of the threshold below which the score must stay for an alarm to end.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
@@ -11,12 +12,10 @@ const RELEASE: f64 = 0.35;
 /// Tuned: on seeds 811 and 812 of `tests/contacts/cyclic.py` with `reference_twin.py` and 841 of `paths.py`, swept
 /// over 0, 0.0025, 0.01 and 0.04 ([docs/papers.md](../../../../docs/papers.md#time-in-alarm-after-a-contact)).
 const GONE: f64 = 0.01;
-/// Duration for which the score must stay that low \[s\].
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
-const HOLD_S: f64 = 0.1;
 /// Smallest change of the residual against the followed contact that can be another contact on top of it, as a
 /// multiple of the threshold. A release does not count.
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
+/// Derived: the change is a difference of two means of equal noise. It has twice the variance of one mean, and a
+/// score is a square.
 const CHANGE: f64 = 2.0;
 /// Time constant with which the residual of a contact is followed \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
@@ -30,19 +29,20 @@ const AGAIN_S: f64 = 0.25;
 const SWELL: f64 = 0.5;
 /// Cosine between change and contact below which even a change smaller than [`SWELL`] is another contact. It applies
 /// only where contacts are classified.
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope), with kinds reported; not swept.
 const ELSEWHERE: f64 = 0.92;
 /// Negative cosine between change and contact beyond which the change is a release, not another contact.
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
+/// Chosen: about cos 45°, half-way between a release and a change across. A smaller one discards contacts across, a
+/// larger one reports an uneven release as another contact.
 const FALLS: f64 = 0.7;
 /// Minimum time instead of [`AGAIN_S`] for a change larger than [`SWELL`] in another direction ([`TURNS`]) \[s\].
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope), with kinds reported; not swept.
 const SOON_S: f64 = 0.1;
 /// Cosine between change and contact below which [`SOON_S`] applies.
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope), with kinds reported; not swept.
 const TURNS: f64 = 0.5;
 /// Delay of an alarm where contacts are classified, in which the direction of the force becomes clear \[s\].
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope), with kinds reported; not swept.
 const DECIDE_S: f64 = 0.012;
 /// Share of the threshold above which a score may already belong to a contact.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
@@ -171,7 +171,7 @@ impl Watch {
         }
         let dt_s = (now_ns - alarm.newest_ns) as f64 * 1e-9;
         alarm.newest_ns = now_ns;
-        if now_ns - alarm.newest_high_ns >= ns(HOLD_S) {
+        if now_ns - alarm.newest_high_ns >= ns(DEFAULT_HOLD_S) {
             self.end();
             return None;
         }

@@ -10,6 +10,7 @@ use std::collections::VecDeque;
 use tauscope_bus::TwinState;
 
 use super::learnt::Learnt;
+use super::stand::STILL_RAD_S;
 use super::tail::{BLOCK_S, Tail};
 
 /// Number of blocks that are kept.
@@ -20,10 +21,6 @@ const REMEMBERED: usize = 3600;
 /// Statistical: 18 of 120 blocks are above the level, and the relative standard error of their mean is a quarter.
 const LEAST: usize = 120;
 const AGAIN: usize = 60;
-/// Speed that a joint must exceed in half of a block for the block to count \[rad/s, m/s\]: the peaks of a stationary
-/// arm do not represent a moving one.
-/// Physical: the highest speed of a joint that is treated as stationary.
-const MOVES: f64 = 0.03;
 
 /// Largest score of each block in which the arm moved.
 #[derive(Debug)]
@@ -79,8 +76,8 @@ impl GoingOn {
             self.end_block(block);
         }
         self.samples += 1;
-        let speed = sample.velocity[..joints].iter();
-        self.moving += usize::from(speed.fold(0.0, |most, v| f64::max(most, v.abs())) > MOVES);
+        let speeds = sample.velocity[..joints].iter().map(|v| v.abs());
+        self.moving += usize::from(speeds.fold(0.0, f64::max) > STILL_RAD_S);
         match alarm {
             // A false alarm is a peak of at least the threshold; a contact must not count for more.
             Some(threshold) if !self.alarm => (self.peak, self.alarm) = (threshold, true),
@@ -90,6 +87,7 @@ impl GoingOn {
     }
 
     fn end_block(&mut self, next: i64) {
+        // The peaks of a stationary arm do not represent a moving one, so it must move for half of a block.
         // A contact is one peak: the block after one with an alarm may contain its end and does not count.
         if 2 * self.moving > self.samples && !self.was_alarm {
             if self.blocks.len() == REMEMBERED {

@@ -9,9 +9,10 @@ use super::means::Means;
 use super::pieces::{Piece, free, marked};
 use super::spans::{Follow, WINDOWS_S};
 
-/// Weight of the joint's overall noise in the noise of a speed class, as duration of observation \[s\].
+/// Weight of the more general value in an estimate, as duration of observation \[s\]: the joint's noise for that of a
+/// speed class, the median of all joints for that of a joint, and zero for the correlation of two joints.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
-const PRIOR_S: f64 = 2.0;
+pub(super) const PRIOR_S: f64 = 2.0;
 /// Lower bound of the mean square without unrest, as a share of the mean square.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const QUIET: f64 = 0.25;

@@ -6,6 +6,8 @@
 //! vanished, the noise of a stationary joint is raised for a while, the more the larger the contact was. While the
 //! contact lasts, the noise is not raised.
 
+use super::stand::STILL_RAD_S;
+
 /// Share of a contact that static friction in a joint may hold, both as roots of a score.
 /// Tuned: on the practice set of cyclic moves, by `tauscope evaluate set.yaml --out results --detectors tauscope`,
 /// together with the sets of paths and assembly. [`HOLDS`] and [`MOST`] at 0.5 and 6 leave 2.2 % of the free time in
@@ -14,12 +16,9 @@ const HOLDS: f64 = 1.0;
 /// Upper bound of the held part, as a root of a score: static friction is bounded, however large the contact was.
 /// Tuned: as [`HOLDS`].
 const MOST: f64 = 10.0;
-/// Time constant with which the held part decays \[s\].
-/// Tuned: as [`HOLDS`].
-const FADES_S: f64 = 1.5;
-/// Speed above which static friction holds nothing \[rad/s, m/s\].
-/// Tuned: the same as where a standing arm is told by; not swept.
-const SLOW: f64 = 0.03;
+/// Time constant with which the residual that static friction holds after a contact creeps back \[s\].
+/// Tuned: as [`HOLDS`], and for stationary arms on the sets named in [`tauscope`](crate::tauscope); not swept.
+pub(super) const FADES_S: f64 = 1.5;
 /// Held part below which the contact is forgotten: it would change a noise by a hundredth.
 /// Resolution: no score changes by more than that.
 const FORGOTTEN: f64 = 0.01;
@@ -63,7 +62,8 @@ impl Recovery {
 
     /// Returns the factor on the noise of a joint whose recent lowest speed is `slow` \[rad/s, m/s\].
     pub fn doubt(&self, slow: f64) -> f64 {
-        1.0 + self.held * self.gone * (1.0 - slow / SLOW).max(0.0)
+        // Static friction holds nothing in a joint that moves.
+        1.0 + self.held * self.gone * (1.0 - slow / STILL_RAD_S).max(0.0)
     }
 }
 

@@ -1,7 +1,9 @@
 //! Windows over which the residual is averaged.
 
 /// Lengths of the windows \[s\]; the last window is used only if it reduces the noise enough.
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
+/// Chosen: from one sample at 100 Hz to below the correlation time of the residual (0.5 s). In white noise a contact
+/// between two windows loses at most 26 % of its signal-to-noise ratio. Coarser steps lose more, finer ones cost
+/// computing time.
 pub(crate) const WINDOWS_S: [f64; 4] = [0.01, 0.03, 0.1, 0.2];
 /// Index of the window for the onset of a contact.
 pub(crate) const SHORTEST: usize = 0;

@@ -7,6 +7,12 @@
 
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
+use crate::frame::DEFAULT_HOLD_S;
+
+/// Highest speed of a stationary joint \[rad/s, m/s\].
+/// Chosen: 30 times the noise of encoders (0.001 rad/s), so that no outlier ends a standstill. A higher speed treats
+/// slow motion, in which friction still changes, as standstill.
+pub(super) const STILL_RAD_S: f64 = 0.03;
 /// Largest displacement of a joint at standstill \[rad, m\]. The joint's speed must also stay below `slow`.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const WITHIN: f64 = 0.01;
@@ -19,9 +25,6 @@ const LEFT: f64 = 0.35;
 /// Largest recent change of the remaining residual for the contact to be over, as a share of the contact.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const STEADY: f64 = 0.05;
-/// Time for which both must hold until the contact is over \[s\].
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
-const OVER_AFTER_S: f64 = 0.1;
 
 /// Detects standstill of the arm.
 #[derive(Debug)]
@@ -99,7 +102,8 @@ impl End {
             self.over_since_ns = None;
             return false;
         }
+        // Both conditions must hold for a while.
         let since_ns = *self.over_since_ns.get_or_insert(now_ns);
-        (now_ns - since_ns) as f64 * 1e-9 >= OVER_AFTER_S
+        (now_ns - since_ns) as f64 * 1e-9 >= DEFAULT_HOLD_S
     }
 }

@@ -14,6 +14,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::pieces::{FOLDS, Piece, marked, quantile};
+use super::spans::{SHORTEST, WINDOWS_S};
 
 /// Number of features: a constant, viscous friction, two Coulomb terms ([`SETS_IN`]), and the recent change of the
 /// expected effort.
@@ -25,17 +26,20 @@ const SETS_IN: [f64; 2] = [0.1, 0.02];
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LATE_S: f64 = 0.04;
 /// Strength of the zero-mean prior on the weights, as duration of observation \[s\].
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
+/// Chosen: in the shortest time that is fitted, 20 s, it shrinks the weight of a feature of unit mean square by a
+/// twentieth. A weaker prior gives arbitrary weights to rarely excited features, a stronger one underestimates
+/// friction.
 const PRIOR_S: f64 = 1.0;
-/// Largest share of the squared residual of held-out recordings that may remain for the baseline to be used.
+/// Largest fraction of the squared residual on held-out recordings with which the baseline is still used.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const PAYS: f64 = 0.6;
 /// Relative uncertainty assigned to the baseline without its constant.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const RIGHT_TO: f64 = 0.1;
 /// Time constant with which the measured effort is smoothed before its changes are measured \[s\].
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
-const SMOOTH_S: f64 = 0.005;
+/// Derived: a low-pass reduces the variance of white noise in proportion to 1 / (2 τ), the mean over a window W to
+/// 1 / W. These are equal for the shortest window if τ = W / 2.
+const SMOOTH_S: f64 = 0.5 * WINDOWS_S[SHORTEST];
 /// Time constant with which the largest recent change of an effort decays \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CALMS_S: f64 = 0.1;
@@ -47,7 +51,8 @@ const LIVELY: f64 = 0.95;
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CORRELATED_S: f64 = 0.5;
 /// Upper bound of the time step of a sample \[s\].
-/// Tuned: a guard against gaps, five periods of the slowest practice set (100 Hz); not swept.
+/// Chosen: five periods at 100 Hz. A smaller bound cuts regular steps, a larger one gives the sample after a gap the
+/// weight of the gap.
 const MOST_STEP_S: f64 = 0.05;
 
 type Features = SVector<f64, FEATURES>;
@@ -75,8 +80,8 @@ pub struct LearntUsual {
 /// [`Products`] of a joint over stretches of recordings, by cross-validation fold.
 type Shown = [Products; FOLDS];
 
-/// Returns the products about each stretch's own means (a residual that drifts between stretches is not friction),
-/// and about zero. Calls `visit` with the size of the expected effort's change at each contact-free sample.
+/// Returns the products about the means of each stretch (a residual that drifts between stretches is not friction),
+/// and about zero. Calls `visit` with the absolute change of the expected effort at each contact-free sample.
 fn shown(
     all: &[Piece<'_>],
     joint: usize,
@@ -104,6 +109,8 @@ fn shown(
             let row = usual.features(sample.velocity[joint]).push(residual);
             of_piece.ger(dt_s, &row, &row, 1.0);
         }
+        // Feature 0 is 1, so row 0 holds the integrals and its first element the duration T. The products about the
+        // means are Σ x yᵀ Δt - (Σ x Δt) (Σ y Δt)ᵀ / T.
         let row = of_piece.row(0);
         let lasts_s = of_piece[(0, 0)].max(f64::MIN_POSITIVE);
         shown[0][piece.fold] += of_piece - row.transpose() * row / lasts_s;
@@ -115,6 +122,7 @@ fn shown(
 fn fit(centred: &Products) -> Weights {
     let products = centred.fixed_view::<{ FEATURES - 1 }, { FEATURES - 1 }>(1, 1);
     let with_residual = centred.fixed_view::<{ FEATURES - 1 }, 1>(1, FEATURES);
+    // Ridge regression: (XᵀX + λ I) w = Xᵀr.
     let held = products + SMatrix::identity() * PRIOR_S;
     let inverse = held.try_inverse();
     inverse.map_or_else(Weights::zeros, |inverse| inverse * with_residual)

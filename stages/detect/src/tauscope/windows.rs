@@ -4,7 +4,7 @@ use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
 use super::learnt::{Learnt, bin};
 use super::means::{Means, borne_out};
-use super::recovery::Recovery;
+use super::recovery::{FADES_S, Recovery};
 use super::rest::Rest;
 use super::spans::{Follow, LONG, MIDDLE, SHORTEST, WINDOWS_S};
 use super::stand::{End, Stand};
@@ -12,10 +12,7 @@ use super::stand::{End, Stand};
 /// Highest speed at which a stationary arm yields to a push \[rad/s, m/s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SLOW: f64 = 0.1;
-/// Time constant and duration of the creep after a contact with a stationary arm \[s\].
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
-const CREEPS_S: f64 = 1.5;
-/// Amplitude of this creep, as a share of the contact.
+/// Amplitude of the creep after a contact with a stationary arm, as a share of the contact.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CREEPS: f64 = 0.1;
 
@@ -179,7 +176,7 @@ impl Windows {
     /// Returns the divisor of the score that allows for creep after a contact with a stationary arm.
     fn creep(&self, now_ns: i64) -> f64 {
         self.settled.map_or(1.0, |over| {
-            let fades = (-((now_ns - over.at_ns) as f64 * 1e-9) / CREEPS_S).exp();
+            let fades = (-((now_ns - over.at_ns) as f64 * 1e-9) / FADES_S).exp();
             (1.0 + CREEPS * over.size * fades).powi(2)
         })
     }
@@ -197,7 +194,8 @@ impl Windows {
         }
         if free {
             self.end.forget();
-            let creeps = |over: Settled| ((now_ns - over.at_ns) as f64 * 1e-9) < CREEPS_S;
+            // The creep is followed for one time constant.
+            let creeps = |over: Settled| ((now_ns - over.at_ns) as f64 * 1e-9) < FADES_S;
             if self.settled.is_some_and(creeps) {
                 self.means.creep(false);
             }

@@ -20,7 +20,8 @@ use plan::Plan;
 
 /// Range of the effort change by a drawn effect, in multiples of the joint's effort noise: root mean square over
 /// the instants that it changes. Visible, but not obvious.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: for simulated cells only; an effect at 5 is just visible, one at 30 is far above the noise without being
+/// obvious.
 const VISIBLE: [f64; 2] = [5.0, 30.0];
 /// Maximum number of places tried for an effect.
 /// Resolution: bounds the computing time; an effect without a place is an error.

@@ -8,7 +8,7 @@ use super::scenario::{ContactKind, LabelSpec, RecordingSpec, Role};
 use super::simulation::Event;
 
 /// Peak force below which a push is labelled to be ignored \[N\].
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: for simulated cells only; of the order of the noise of forces that are estimated from joint efforts.
 const WEAK_N: f64 = 2.0;
 
 /// The labels of a set of recordings, as `tauscope evaluate` reads them. Times are seconds from the

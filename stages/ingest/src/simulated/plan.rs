@@ -14,24 +14,25 @@ use crate::recorded::RecordedSource;
 use crate::setup::Setup;
 
 /// Integration step of the plant \[ns\].
-/// Resolution: the error of the integration, against its computing time.
+/// Resolution: balances the integration error against the computing time.
 pub(super) const STEP_NS: i64 = 250_000;
 /// Pause between two recordings of a session \[ns\].
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: for simulated cells only; long enough for recordings to be separate, short against drift of a session.
 const PAUSE_NS: i64 = 10_000_000_000;
-/// Range to either side of a joint without limits \[rad\].
+/// Range in either direction of a joint without position limits \[rad\].
 /// Physical: half a turn.
 const FREE_RANGE: f64 = std::f64::consts::PI;
-/// Highest velocity of a joint without limit \[rad/s\].
+/// Highest velocity of a joint without a velocity limit \[rad/s\].
 /// Physical: about the joint speed limit of common arms, 2 to 3 rad/s.
 const FREE_VELOCITY: f64 = 2.0;
 /// Number of random streams per recording.
 /// Resolution: at least the number of streams requested from [`random`].
 const STREAMS: u64 = 8;
 
-/// Returns the random numbers of a recording's stream: 0 for its motion, 1 for its pushes, 2 for its sensors.
+/// Returns the generator of a recording's random stream: 0 for its motion, 1 for its pushes, 2 for its sensors.
 pub(super) fn random(scenario: &Scenario, index: usize, stream: u64) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(scenario.seed);
+    // Streams of their own: a change of the motion leaves the noise of the sensors as it was.
     rng.set_stream(index as u64 * STREAMS + stream);
     rng
 }
@@ -70,7 +71,7 @@ pub(super) fn joint_ranges(model: &Model) -> Result<Vec<JointRange>, ScenarioErr
     Ok(ranges.collect())
 }
 
-/// Returns the arm with the tool that its controller knows.
+/// Returns the arm with the tool that its controller models.
 pub(super) fn with_tool(scenario: &Scenario, model: &Model) -> Result<Model, ScenarioError> {
     let mut model = model.clone();
     if let Some(tool) = &scenario.tool {

@@ -13,7 +13,7 @@ use super::plant::Contact;
 use super::scenario::{ContactKind, HandsSpec, LabelSpec, Profile, RecordingSpec};
 
 /// Largest distance of a random push from the link's centre of mass, along each axis \[m\].
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: for simulated cells only; within the radius of a link.
 const REACH_M: f64 = 0.03;
 
 /// A force on a link that rises, holds and falls.

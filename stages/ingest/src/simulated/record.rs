@@ -1,4 +1,4 @@
-//! Terms of the record: they turn the effort that the drives apply into the effort that they report.
+//! Terms of [`Layer::Record`]: they convert the effort that the drives apply into the effort that they report.
 
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Layer, MotionSample, Term, TermSpec};
@@ -6,7 +6,7 @@ use tauscope_dynamics::terms::{Layer, MotionSample, Term, TermSpec};
 use super::error::ScenarioError;
 use super::plant::Plant;
 
-/// Terms of the record, applied at every step of the plant.
+/// Terms of [`Layer::Record`], applied at every integration step of the plant.
 #[derive(Debug)]
 pub(super) struct Record {
     terms: Vec<Box<dyn Term>>,
@@ -16,7 +16,7 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Selects the terms of the record among `specs`.
+    /// Builds the terms of [`Layer::Record`] among `specs`.
     pub fn new(model: &Model, specs: &[TermSpec]) -> Result<Self, ScenarioError> {
         let mut terms = Vec::new();
         for spec in specs {
@@ -32,7 +32,7 @@ impl Record {
         })
     }
 
-    /// Takes the effort of the drives \[N m\], `dt_s` after the previous one.
+    /// Updates the reported effort from the effort of the drives \[N m\], `dt_s` after the previous update.
     pub fn take(&mut self, plant: &Plant, effort_nm: &[f64], dt_s: f64) {
         let n = self.effort_nm.len();
         self.effort_nm.copy_from_slice(&effort_nm[..n]);

@@ -4,15 +4,13 @@
 use tauscope_archive::Twice;
 use tauscope_archive::ros::JointStateType;
 use tauscope_bus::Trouble;
+use tauscope_session::suggest::LEAST_SIMILARITY;
 
 use super::joint_names::{list, slip};
 use super::keys::KeyScheme;
 use super::publication::{Form, Publication};
 use super::scout::Seen;
 use crate::config::Keys;
-
-/// Smallest similarity of names (Jaro-Winkler, 0 to 1) at which another topic was probably meant.
-const LEAST_SIMILARITY: f64 = 0.85;
 
 /// Topic, joints and endpoints that a source expects.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! Differences between the joint names of the messages and those of the URDF.
 
-/// Smallest similarity (Jaro-Winkler, 0 to 1) of two names for the same joint.
-const LEAST_SIMILARITY: f64 = 0.85;
+use tauscope_session::suggest::LEAST_SIMILARITY;
+
 /// Maximum number of pairs named in a sentence.
 const MAX_PAIRS: usize = 4;
 

@@ -43,7 +43,7 @@ pub fn cell(joints: &str) -> Setup {
     }
 }
 
-/// The recording at `path`, its states on `/joint_states`.
+/// Returns the settings of the recording at `path`, with the default topics.
 pub fn file(path: &Path) -> FileConfig {
     FileConfig {
         path: path.to_owned(),
@@ -51,7 +51,7 @@ pub fn file(path: &Path) -> FileConfig {
     }
 }
 
-/// A state of `names`; what is empty stays empty.
+/// Returns a joint state without velocities; an empty slice leaves its field empty.
 pub fn state(stamp_ns: i64, names: &str, position: &[f64], effort: &[f64]) -> ros::JointState {
     ros::JointState {
         header: ros::Header::new(stamp_ns, ""),

@@ -26,7 +26,7 @@ use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
 
 /// Time window of a live plot \[ns\].
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Layout: by eye; no number depends on it.
 const LIVE_WINDOW_NS: i64 = 30_000_000_000;
 
 /// Purpose of the layout.

@@ -20,10 +20,10 @@ use crate::streams::{Stream, Streams};
 use crate::words::{Severity, headline, loaded_joints, over};
 
 /// Scale of force arrows \[m/N\]: a metre for 100 N, so that a push by hand is as long as a forearm.
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Layout: by eye; no number depends on it.
 const M_PER_N: f64 = 0.01;
 /// Length of a direction arrow \[m\].
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Layout: by eye; no number depends on it.
 const DIRECTION_M: f64 = 0.3;
 
 /// Repetition period of an unchanged state, for viewers that connect later \[ns\].

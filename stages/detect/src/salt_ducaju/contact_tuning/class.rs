@@ -52,7 +52,7 @@ pub(crate) fn best(sweep: &[ClassSweep]) -> [f64; 2] {
 #[allow(
     clippy::float_cmp,
     clippy::unwrap_used,
-    reason = "tests compare what must be the same bits, and fail where they cannot go on"
+    reason = "tests compare exact bits, and a failed set-up is a failed test"
 )]
 mod tests {
     use super::*;

@@ -10,7 +10,7 @@ use super::vectors::{VectorModel, VectorScorer, Vectors};
 use crate::frame::{LearnError, SignalSettings, Task, Trained, TrainedError};
 
 /// Cache for kernel values in training \[MB\].
-/// Tuned: for what it costs in time; not swept.
+/// Resolution: changes the computing time and the memory of the training, not its result.
 const CACHE_MB: f64 = 400.0;
 /// Tolerance of the optimum, as in LIBSVM and scikit-learn.
 /// Tuned: by the authors of LIBSVM.

@@ -13,10 +13,10 @@ use super::super::trajectory::{JointRange, Target};
 /// Resolution: of the effort by which an effect is sized.
 const RATE_HZ: f64 = 100.0;
 /// Noise assumed for noiseless sensors, as a fraction of the motor's effort.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: for simulated cells only; of the order of the noise of real effort sensors.
 const NO_NOISE: f64 = 0.002;
 /// Largest fraction of a motor's effort that the motions may need with the effect.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: for simulated cells only; a tenth stays for the corrections of the controller.
 const MOTOR_SHARE: f64 = 0.9;
 /// Effort change below which an instant is treated as unchanged \[N m\].
 /// Resolution: above the rounding of efforts.

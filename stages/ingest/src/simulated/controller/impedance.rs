@@ -13,10 +13,10 @@ use super::super::scenario::{Damps, ImpedanceSpec};
 use super::super::trajectory::{JointRange, Target};
 
 /// Regularization of the null-space projection near singular postures \[m²\].
-/// Resolution: 1 mm squared, far below an arm's lever.
+/// Resolution: 1 mm squared, far below the squared lever arms of a robot.
 const SMOOTH: f64 = 1e-6;
 
-/// Holds the tool at its reference like a spring and a damper.
+/// Controller that holds the tool at its reference like a spring and a damper.
 ///
 /// Equation 1 with I = 0, as in the paper's section III-A: `F = B Δξ' + K Δξ`, where Δξ is the
 /// displacement of the tool from its reference and the vector part of the unit quaternion of its rotation,
@@ -30,7 +30,7 @@ pub(in super::super) struct ImpedanceController {
     model: Model,
     data: Data,
     held: LinkPoint,
-    /// Stiffness of translation, per displacement, and of rotation, per vector part of the quaternion.
+    /// Stiffness against translation \[N/m\], and against rotation per vector part of the quaternion \[N m\].
     stiffness: [f64; 2],
     damping: [f64; 2],
     damps: Damps,
@@ -52,6 +52,7 @@ impl ImpedanceController {
         for (limit, joint) in limit.iter_mut().zip(joints) {
             *limit = joint.effort;
         }
+        // b = 2 ζ √k, the damping of a unit mass.
         let damping = |given: Option<f64>, stiffness: f64| {
             given.unwrap_or(2.0 * spec.damping_ratio * stiffness.sqrt())
         };
@@ -74,7 +75,7 @@ impl ImpedanceController {
         })
     }
 
-    /// Takes a new target and the encoder readings.
+    /// Computes the effort for a new target and the encoder readings.
     pub fn update(&mut self, target: &Target, position: &[f64], velocity: &[f64]) {
         let n = position.len();
         let (model, data) = (&self.model, &mut self.data);
@@ -87,7 +88,7 @@ impl ImpedanceController {
         let jacobian = self.held.jacobian(model, data);
 
         let displacement = reference.translation.vector - pose.translation.vector;
-        // The shorter way round: a quaternion and its negative are one rotation.
+        // A quaternion and its negative are the same rotation; the sign of w selects the shorter way.
         let rotation = pose.rotation.inverse() * reference.rotation;
         let vector_part = pose.rotation * (rotation.imag() * rotation.w.signum());
         // The vector part's derivative is half the difference of the angular velocities, as long as the

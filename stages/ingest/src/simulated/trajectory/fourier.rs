@@ -12,7 +12,7 @@ use crate::simulated::scenario::FourierSpec;
 /// Resolution: of a period; at most 50 harmonics leave 20 instants for the fastest.
 const STEPS_PER_PERIOD: f64 = 1000.0;
 /// Duration of the blend at either end, so that the arm begins and ends at rest \[s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Chosen: for simulated cells only; long enough for the blend to add little acceleration, short against a recording.
 const BLEND_S: f64 = 2.0;
 
 /// The motion `q0 + s(t) Σ a sin(k ω t) + b cos(k ω t)`, with s(t) the blend.

@@ -12,13 +12,13 @@ use crate::error::RecordError;
 use crate::rerun::store::{Out, Store};
 
 /// Radius of a skeleton's bones, relative to the robot's length.
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Layout: by eye; no number depends on it.
 const BONE_RADIUS: f64 = 0.03;
 /// Radius of the drum at each joint, relative to the bones' radius.
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Layout: by eye; no number depends on it.
 const DRUM_RADIUS: f32 = 1.25;
 /// Length of the drum at each joint, relative to the bones' radius.
-/// Tuned: by eye, for the picture; no number depends on it.
+/// Layout: by eye; no number depends on it.
 const DRUM_LENGTH: f32 = 3.6;
 
 /// The shapes of one link, in its frame.
