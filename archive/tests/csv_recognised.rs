@@ -131,7 +131,7 @@ fn a_header_that_is_nearly_known_is_described_by_a_columns_file() {
             "i,a.position,b.position,c.position",
             "no column is called time",
         ),
-        ("1,2,3,4", "the first line (1, 2, 3, 4) does not say"),
+        ("1,2,3,4", "the first line (1, 2, 3, 4) does not identify"),
     ] {
         let said = refusal(&format!("{header}\n0,1,2,3\n"));
         assert!(

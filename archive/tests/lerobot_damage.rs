@@ -83,7 +83,7 @@ fn times_are_checked_and_kept_where_they_are_off_the_grid() {
     let episode = |number| data().join(format!("times/episode_{number}"));
     let said = refusal(&episode(0));
     assert!(
-        said.contains("row 2 (timestamp): NaN is not a time"),
+        said.contains("row 2 (timestamp): NaN is not a valid time"),
         "{said}"
     );
     let said = refusal(&episode(1));

@@ -198,7 +198,7 @@ const SLIPS: &[Slip] = &[
     Slip {
         typed: "calibrate @standing.mcap --robot @demo_arm.urdf --effort-unit A --out @x.yaml",
         code: 2,
-        says: &["the arm stands", "torque constants"],
+        says: &["the arm is at rest", "torque constants"],
     },
     Slip {
         typed: "calibrate @turned.mcap --robot @demo_arm.urdf --effort-unit A --out @x.yaml",
