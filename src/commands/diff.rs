@@ -254,7 +254,7 @@ fn places(comparison: &Comparison) -> Vec<(String, Counts)> {
         places.push((format!("cell {cell}"), counts));
         for (kind, within) in [("link", &comparison.links), ("joint", &comparison.joints)] {
             for (name, &counts) in within.get(cell).into_iter().flatten() {
-                let name = if name.is_empty() { "unknown" } else { name };
+                let name = if name.is_empty() { "unnamed" } else { name };
                 places.push((format!("  {kind} {name}"), counts));
             }
         }
