@@ -74,7 +74,7 @@ fn several_are_different_ones_in_different_joints() {
     assert!(
         masses
             .unwrap_err()
-            .starts_with("conceal: only 1 of 2 effects can be seen")
+            .starts_with("conceal: only 1 of 2 effects are visible")
     );
 }
 
