@@ -15,7 +15,7 @@
 //! - A collision is latched: it never ends by itself.
 //! - A collision that begins after the acknowledgement is a new one.
 //! - While muted, contacts and collisions raise no stop, and none is latched. An earlier latch stays. A collision
-//! that   still lasts when the lease ends is latched then.
+//!   that still lasts when the lease ends is latched then.
 //! - The alarm is not free before every detector has judged a sample, nor while one cannot judge.
 
 use tauscope_bus::command::MuteLease;
