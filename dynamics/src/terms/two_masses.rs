@@ -269,11 +269,7 @@ impl Oscillator {
         let swing = frequency * (1.0 - damping * damping).sqrt();
         let (sin, cos) = (swing * dt_s).sin_cos();
         let is_sampled = swing * dt_s < std::f64::consts::PI;
-        let left = if is_sampled {
-            (-decay * dt_s).exp()
-        } else {
-            0.0
-        };
+        let left = f64::from(is_sampled) * (-decay * dt_s).exp();
         Self {
             frequency,
             damping,
