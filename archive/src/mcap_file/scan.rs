@@ -93,7 +93,7 @@ impl Scan<'_> {
 
     fn chunk(&mut self, walk: &mut Walk, record: Record) -> io::Result<()> {
         if record.len > MAX_LOADED_BYTES as u64 {
-            // The body is not read: that of the record before must not give its time.
+            // The buffer still has the body of the record before, whose times are not those of this chunk.
             self.body.clear();
             self.broken_chunk(record, too_long(record.len));
             return Ok(());
