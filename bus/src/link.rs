@@ -250,6 +250,9 @@ pub trait Sender<T: Sample>: Send {
     /// Waits, after [`Sender::end`], until every connected receiver has taken the end and so all samples before it.
     /// Returns the number of receivers that have not. A process that exits earlier may lose unread samples.
     ///
+    /// The wait ends `timeout` after the end or after the last progress that the transport knows of, whichever is
+    /// later, as the user timeout of TCP (RFC 5482): a slow receiver is no reason to give up.
+    ///
     /// # Errors
     /// See [`Sender::send_with`].
     fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError>;

@@ -34,7 +34,7 @@ pub use tree::Tree;
 /// Longest wait for a sample between two checks for a stop request.
 /// Resolution: delay of a stop, against the number of wake-ups.
 const TICK: Duration = Duration::from_millis(100);
-/// Longest time that a terminating stage waits for receivers that have not read all of its stream.
+/// Longest time that a terminating stage waits, without progress, for receivers that have not read all of its stream.
 /// Resolution: duration of a shutdown.
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
 

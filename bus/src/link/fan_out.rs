@@ -58,10 +58,9 @@ impl<T: Sample> Sender<T> for FanOut<T> {
     }
 
     fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        let deadline = Instant::now() + timeout;
+        // The time counts from the end of the stream, so that stalled links do not add up.
         self.links.iter_mut().try_fold(0, |missing, link| {
-            let left = deadline.saturating_duration_since(Instant::now());
-            Ok(missing + link.wait_until_taken(left)?)
+            Ok(missing + link.wait_until_taken(timeout)?)
         })
     }
 

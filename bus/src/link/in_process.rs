@@ -131,7 +131,7 @@ struct InProcessSender<T> {
     /// Slots in use and free ones; at most as many as all readers together can hold.
     slots: Vec<Arc<T>>,
     cursor: usize,
-    end: Option<Arc<T>>,
+    end: Option<(Arc<T>, Instant)>,
     counts: SenderCounts,
 }
 
@@ -205,7 +205,7 @@ impl<T: Sample> Sender<T> for InProcessSender<T> {
             });
         }
         self.next += 1;
-        self.end = Some(slot);
+        self.end = Some((slot, Instant::now()));
         Ok(())
     }
 
@@ -232,11 +232,12 @@ impl<T: Sample> Sender<T> for InProcessSender<T> {
     }
 
     fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        let Some(end) = &self.end else { return Ok(0) };
-        let deadline = Instant::now() + timeout;
+        let Some((end, since)) = &self.end else {
+            return Ok(0);
+        };
         loop {
             let holders = Arc::strong_count(end) - 1;
-            if holders == 0 || Instant::now() >= deadline {
+            if holders == 0 || since.elapsed() >= timeout {
                 return Ok(holders);
             }
             std::thread::sleep(Duration::from_millis(1));

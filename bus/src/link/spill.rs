@@ -60,6 +60,8 @@ struct State<T> {
     spare: Vec<Vec<(u64, T)>>,
     /// Number of samples that are not sent yet.
     held: usize,
+    /// Time at which the stream ended or `held` last fell, whichever is later.
+    moved: Instant,
     /// Samples lost since the last one that found room.
     skipped: u64,
     /// The thread waits for a notification.
@@ -80,6 +82,7 @@ impl<T> Default for State<T> {
             chunks: VecDeque::new(),
             spare: Vec::new(),
             held: 0,
+            moved: Instant::now(),
             skipped: 0,
             idle: false,
             ended: false,
@@ -182,6 +185,7 @@ impl<T: Sample> Sender<T> for Spill<T> {
         self.start()?;
         let mut state = self.shared.lock();
         state.ended = true;
+        state.moved = Instant::now();
         drop(state);
         self.shared.filled.notify_one();
         Ok(())
@@ -193,14 +197,22 @@ impl<T: Sample> Sender<T> for Spill<T> {
     }
 
     fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        let deadline = Instant::now() + timeout;
-        let pending = |state: &mut State<T>| state.returned.is_none() && state.failure.is_none();
         let shared = Arc::clone(&self.shared);
         let mut state = shared.lock();
         if !state.ended {
             return Ok(0);
         }
-        state = wait(&shared.changed, state, timeout, pending);
+        while state.returned.is_none() && state.failure.is_none() {
+            let left = timeout.saturating_sub(state.moved.elapsed());
+            if left.is_zero() {
+                break;
+            }
+            let moved = state.moved;
+            let pending = |state: &mut State<T>| {
+                state.returned.is_none() && state.failure.is_none() && state.moved == moved
+            };
+            state = wait(&shared.changed, state, left, pending);
+        }
         if let Some(error) = state.failure.take() {
             return Err(error);
         }
@@ -210,8 +222,7 @@ impl<T: Sample> Sender<T> for Spill<T> {
             return Ok(self.receivers.max(1) as usize);
         };
         drop(state);
-        let left = deadline.saturating_duration_since(Instant::now());
-        let missing = inner.wait_until_taken(left)?;
+        let missing = inner.wait_until_taken(timeout)?;
         self.shared.lock().undelivered = inner.counts().undelivered;
         Ok(missing)
     }
@@ -266,6 +277,7 @@ impl<T: Sample> Shared<T> {
             }
             let mut state = self.lock();
             state.held -= count;
+            state.moved = Instant::now();
             state.undelivered = inner.counts().undelivered;
             if state.spare.len() < SPARE {
                 state.spare.push(chunk);

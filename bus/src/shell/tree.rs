@@ -167,9 +167,8 @@ impl<'a> Tree<'a> {
         context.board.ends();
         self.root.part().finish()?;
         self.turn.check()?;
-        let deadline = Instant::now() + TAKEN_WITHIN;
         walk(self.root.part(), &mut |part| {
-            part.wait_until_taken(deadline)
+            part.wait_until_taken(TAKEN_WITHIN)
         })?;
         Ok(outcome)
     }

@@ -40,6 +40,7 @@ pub(super) struct SharedMemorySender<T: Sample> {
     taken: usize,
     /// Number of receivers that the end was sent to.
     ended: usize,
+    ended_at: Instant,
     backpressure: Arc<Backpressure>,
     /// Sum of the receivers' ids; `joined` has the sequence number of its last change.
     receivers: u128,
@@ -96,6 +97,7 @@ impl<T: Sample> SharedMemorySender<T> {
             greeted: 0,
             taken: 0,
             ended: 0,
+            ended_at: Instant::now(),
             backpressure,
             receivers: 0,
             joined: Joined::default(),
@@ -195,6 +197,7 @@ impl<T: Sample> Sender<T> for SharedMemorySender<T> {
         self.listen(Duration::ZERO)?;
         self.taken = 0;
         self.ended = self.send(&mut |sample| sample.header_mut().flags = flags::END)?;
+        self.ended_at = Instant::now();
         Ok(())
     }
 
@@ -214,9 +217,8 @@ impl<T: Sample> Sender<T> for SharedMemorySender<T> {
     }
 
     fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        let deadline = Instant::now() + timeout;
         loop {
-            let left = deadline.saturating_duration_since(Instant::now());
+            let left = timeout.saturating_sub(self.ended_at.elapsed());
             let missing = self.ended.saturating_sub(self.taken);
             if missing == 0 || left.is_zero() {
                 return Ok(missing);

@@ -77,6 +77,8 @@ pub(super) struct Log<T> {
     cursor: u64,
     /// Sequence number of the end mark.
     end: Option<u64>,
+    /// Time at which the end mark was appended.
+    ended: Option<Instant>,
     readers: BTreeMap<String, Reader>,
     /// Samples never delivered to receivers that disconnected or never connected.
     undelivered: u64,
@@ -94,6 +96,7 @@ impl<T: Copy> Log<T> {
             skipped: 0,
             cursor: 0,
             end: None,
+            ended: None,
             readers: BTreeMap::new(),
             undelivered: 0,
         }
@@ -155,8 +158,9 @@ impl<T: Copy> Log<T> {
     }
 
     /// Appends the end mark.
-    pub(super) fn push_end(&mut self, mark: T) {
+    pub(super) fn push_end(&mut self, mark: T, now: Instant) {
         self.end = Some(self.next);
+        self.ended = Some(now);
         self.append(mark);
     }
 
@@ -285,6 +289,18 @@ impl<T: Copy> Log<T> {
         let Some(end) = self.end else { return 0 };
         let readers = self.readers.values();
         readers.filter(|reader| reader.next <= end).count()
+    }
+
+    /// Whether a receiver that has not acknowledged the end has made progress within `timeout`, counted from the end
+    /// mark at the earliest.
+    pub(super) fn is_awaited(&self, now: Instant, timeout: Duration) -> bool {
+        let (Some(end), Some(ended)) = (self.end, self.ended) else {
+            return false;
+        };
+        let mut readers = self.readers.values();
+        readers.any(|reader| {
+            reader.next <= end && now.duration_since(reader.moved.max(ended)) < timeout
+        })
     }
 
     /// Drops all samples when the sender shuts down, and counts the unacknowledged ones as undelivered.

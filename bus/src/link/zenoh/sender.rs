@@ -184,20 +184,6 @@ impl<T: Sample> ZenohSender<T> {
             None => Ok(state),
         }
     }
-
-    /// Waits until `count` is 0, at most for `timeout`, and returns the last count.
-    fn until_none(&self, timeout: Duration, count: impl Fn(&Log<T>) -> usize) -> usize {
-        let deadline = Instant::now() + timeout;
-        let mut state = self.shared.lock();
-        loop {
-            let left = deadline.saturating_duration_since(Instant::now());
-            let found = count(&state.log);
-            if found == 0 || left.is_zero() || state.failure.is_some() {
-                return found;
-            }
-            state = wait(&self.shared.changed, state, left);
-        }
-    }
 }
 
 fn most_of_a_message<T>() -> usize {
@@ -256,7 +242,7 @@ impl<T: Sample> Sender<T> for ZenohSender<T> {
         mark.header_mut().flags = flags::END;
         let mut state = self.room()?;
         mark.header_mut().sequence = state.log.next();
-        state.log.push_end(mark);
+        state.log.push_end(mark, Instant::now());
         state.hurry();
         drop(state);
         self.shared.filled.notify_one();
@@ -264,12 +250,24 @@ impl<T: Sample> Sender<T> for ZenohSender<T> {
     }
 
     fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        Ok(self.until_none(timeout, Log::missing))
+        let deadline = Instant::now() + timeout;
+        let mut state = self.shared.lock();
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let missing = state.log.missing();
+            if missing == 0 || left.is_zero() || state.failure.is_some() {
+                return Ok(missing);
+            }
+            state = wait(&self.shared.changed, state, left);
+        }
     }
 
     fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        let untaken = self.until_none(timeout, Log::untaken);
         let mut state = self.shared.lock();
+        while state.failure.is_none() && state.log.is_awaited(Instant::now(), timeout) {
+            state = wait(&self.shared.changed, state, LOOK_EVERY);
+        }
+        let untaken = state.log.untaken();
         if let Some(error) = state.failure.take() {
             return Err(error);
         }

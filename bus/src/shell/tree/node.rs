@@ -58,10 +58,9 @@ impl<'a, T: Sample> Outlet<'a, T> {
         link.map_or(Ok(0), |link| link.wait_for_receivers(timeout))
     }
 
-    fn wait_until_taken(&mut self, deadline: Instant) -> Result<usize, LinkError> {
-        let left = deadline.saturating_duration_since(Instant::now());
+    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
         let link = self.link.as_mut();
-        link.map_or(Ok(0), |link| link.wait_until_taken(left))
+        link.map_or(Ok(0), |link| link.wait_until_taken(timeout))
     }
 
     /// Ends the stream for all receivers.
@@ -164,11 +163,11 @@ pub trait Part {
     /// If the stage, or one behind it, cannot finish.
     fn finish(&mut self) -> Result<(), StageError>;
 
-    /// Waits until all receivers have read to the end.
+    /// Waits until all receivers have read to the end; see [`Sender::wait_until_taken`].
     ///
     /// # Errors
     /// If a link fails.
-    fn wait_until_taken(&mut self, deadline: Instant) -> Result<(), LinkError>;
+    fn wait_until_taken(&mut self, timeout: Duration) -> Result<(), LinkError>;
 
     /// Visits each stage that receives its stream.
     ///
@@ -240,10 +239,9 @@ impl<'a, O: Sample> Frame<'a, O> {
         Ok(self.health.wait_for_receivers(timeout)? + self.out.wait_for_receivers(timeout)?)
     }
 
-    pub fn wait_until_taken(&mut self, deadline: Instant) -> Result<(), LinkError> {
-        let data = self.out.wait_until_taken(deadline)?;
-        let left = deadline.saturating_duration_since(Instant::now());
-        self.report.untaken = data + self.health.wait_until_taken(left)?;
+    pub fn wait_until_taken(&mut self, timeout: Duration) -> Result<(), LinkError> {
+        let data = self.out.wait_until_taken(timeout)?;
+        self.report.untaken = data + self.health.wait_until_taken(timeout)?;
         Ok(())
     }
 
@@ -335,8 +333,8 @@ impl<I: Sample, O: Sample> Part for Node<'_, I, O> {
         Ok(())
     }
 
-    fn wait_until_taken(&mut self, deadline: Instant) -> Result<(), LinkError> {
-        self.frame.wait_until_taken(deadline)
+    fn wait_until_taken(&mut self, timeout: Duration) -> Result<(), LinkError> {
+        self.frame.wait_until_taken(timeout)
     }
 
     fn behind(

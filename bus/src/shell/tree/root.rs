@@ -135,8 +135,8 @@ impl<T: Sample> Part for SourceRoot<'_, T> {
         Ok(())
     }
 
-    fn wait_until_taken(&mut self, deadline: Instant) -> Result<(), LinkError> {
-        self.frame.wait_until_taken(deadline)
+    fn wait_until_taken(&mut self, timeout: Duration) -> Result<(), LinkError> {
+        self.frame.wait_until_taken(timeout)
     }
 
     fn behind(

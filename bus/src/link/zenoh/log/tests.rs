@@ -128,7 +128,7 @@ fn the_end_goes_out_until_it_is_taken() {
         let mut log = Log::new(keep, Audience::of(keep, 1), 10, PATIENCE);
         log.join("a", 64, now);
         push(&mut log, 0..3);
-        log.push_end(99);
+        log.push_end(99, now);
         assert_eq!(out(&mut log, now), [0, 1, 2, 99]);
         assert_eq!(log.untaken(), 1);
         log.look_back(now + AGAIN_AFTER);
@@ -136,6 +136,28 @@ fn the_end_goes_out_until_it_is_taken() {
         log.taken("a", (4, 0), false, now);
         assert_eq!((log.untaken(), log.is_empty()), (0, true), "{keep:?}");
     }
+}
+
+/// A recorder that had 12 s of samples to catch up with after a network failure was given up on after 10 s, and then
+/// waited for the rest forever.
+#[test]
+fn a_receiver_that_makes_progress_is_awaited_however_long_it_takes() {
+    let begin = Instant::now();
+    let mut log = log(1, 100);
+    log.join("a", 64, begin);
+    push(&mut log, 0..20);
+    log.push_end(99, begin);
+    assert_eq!(out(&mut log, begin).len(), 21);
+    let mut now = begin;
+    for next in 1..=20 {
+        now += PATIENCE / 2;
+        log.taken("a", (next, 0), false, now);
+        assert!(log.is_awaited(now, PATIENCE));
+    }
+    assert!(!log.is_awaited(now + PATIENCE, PATIENCE), "stalled");
+    assert_eq!(log.untaken(), 1);
+    log.taken("a", (21, 0), false, now);
+    assert!(!log.is_awaited(now, PATIENCE), "all taken");
 }
 
 #[test]
