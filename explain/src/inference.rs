@@ -29,6 +29,7 @@ mod sharpen;
 mod space;
 mod state;
 mod step;
+mod tangents;
 mod temper;
 mod variants;
 mod visited;
@@ -103,7 +104,7 @@ pub fn infer(
         let sizes = state.sizes(&fit);
         let nuisances = nuisance::of(problem, &fit, &sizes, bodies, state.scales);
         let given = variants::all(problem, &fit, hypotheses, &state.efforts);
-        let measured = variants::measured(problem, &fit);
+        let measured = tangents::measured(problem, &fit);
         state.estimate_noise(&fit, &nuisances, &given, &measured, false);
         let space = state.space(&nuisances);
         let (objective, mut taken, is_partial) = searched(problem, &state, &space, &fit, given);
@@ -166,7 +167,7 @@ fn begun(
 ) -> Fit {
     say("comparing explanations");
     let sizes = state.sizes(&fit);
-    let measured = variants::measured(problem, &fit);
+    let measured = tangents::measured(problem, &fit);
     let nuisances = nuisance::of(problem, &fit, &sizes, state.bodies, state.scales);
     let given = variants::all(problem, &fit, hypotheses, &state.efforts);
     state.estimate_noise(&fit, &nuisances, &given, &measured, true);
@@ -212,7 +213,7 @@ fn searched<'s>(
     fit: &Fit,
     given: Vec<Given>,
 ) -> (Objective<'s>, Taken, bool) {
-    let measured = variants::measured(problem, fit);
+    let measured = tangents::measured(problem, fit);
     let mut objective = Objective::new(space, &measured, given);
     let own: Set = (0..fit.actives.len()).collect();
     let sharper = sharpen::sharpened(problem, fit, &objective, &own, &state.efforts);
@@ -266,7 +267,7 @@ pub fn around(problem: &Problem, hypotheses: &[Hypothesis], fit: Fit, bodies: bo
     let sizes = state.sizes(&fit);
     let nuisances = nuisance::of(problem, &fit, &sizes, bodies, state.scales);
     let given = variants::all(problem, &fit, hypotheses, &state.efforts);
-    let measured = variants::measured(problem, &fit);
+    let measured = tangents::measured(problem, &fit);
     state.estimate_noise(&fit, &nuisances, &given, &measured, false);
     let space = state.space(&nuisances);
     let objective = Objective::new(&space, &measured, given);

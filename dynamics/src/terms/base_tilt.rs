@@ -44,10 +44,7 @@ pub(super) static EFFECT: Effect = Effect {
             vec![("roll_rad", angle * cos), ("pitch_rad", angle * sin)]
         })
     }),
-    traits: Traits {
-        bends: true,
-        ..Traits::NONE
-    },
+    traits: Traits::NONE,
     build: |site, values| BaseTilt::boxed(&EFFECT, site, values, While::Always),
 };
 

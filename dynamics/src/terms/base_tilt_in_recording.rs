@@ -46,7 +46,6 @@ pub(super) static EFFECT: Effect = Effect {
     concealed: None,
     traits: Traits {
         is_off_list: true,
-        bends: true,
         fills_recording: true,
         most_at_one_place: 8,
         ..Traits::NONE

@@ -62,6 +62,14 @@ impl PartialEq for Effect {
 }
 
 impl Effect {
+    /// Whether its effort is linear in its factors to first order only, so that it is recomputed for each of their
+    /// values.
+    pub fn bends(&self) -> bool {
+        let bends =
+            |c: &Coordinate| matches!(c.kind, CoordinateKind::Factor { step, .. } if step < 1.0);
+        self.coordinates.iter().any(bends)
+    }
+
     /// Time during which it acts.
     pub fn time(&self) -> Time {
         let count = |kind| self.coordinates.iter().filter(|c| c.kind == kind).count();
@@ -250,8 +258,6 @@ pub struct Traits {
     /// Parameter of its simpler effect, from its coordinates and a time of the session \[s\], if it changes
     /// continuously. Its coordinates are this parameter at the start of the session and its growth.
     pub drifts: Option<fn(&[f64], f64) -> f64>,
-    /// Its effort is linear in its factors to first order only, so it is recomputed for each of their values.
-    pub bends: bool,
     /// It acts during one whole recording: its two times are the ends of a recording.
     pub fills_recording: bool,
     /// It acts from the start of the session to some time, or from some time to its end, possibly over several
@@ -281,7 +287,6 @@ impl Traits {
         describes_only: false,
         is_off_list: false,
         drifts: None,
-        bends: false,
         fills_recording: false,
         in_session: false,
         may_be_overstated: false,

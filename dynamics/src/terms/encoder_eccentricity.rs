@@ -58,7 +58,6 @@ pub(super) static EFFECT: Effect = Effect {
     }),
     traits: Traits {
         is_off_list: true,
-        bends: true,
         ..Traits::NONE
     },
     build: |site, values| {

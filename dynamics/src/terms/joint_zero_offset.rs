@@ -41,7 +41,6 @@ pub(super) static EFFECT: Effect = Effect {
     }),
     traits: Traits {
         is_off_list: true,
-        bends: true,
         smallest_told_as: Some("offset_rad"),
         ..Traits::NONE
     },

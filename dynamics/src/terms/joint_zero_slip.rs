@@ -49,7 +49,6 @@ pub(super) static EFFECT: Effect = Effect {
     concealed: None,
     traits: Traits {
         is_off_list: true,
-        bends: true,
         ..Traits::NONE
     },
     build: |site, values| {

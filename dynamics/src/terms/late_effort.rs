@@ -39,7 +39,6 @@ pub(super) static EFFECT: Effect = Effect {
     traits: Traits {
         shifts_time: true,
         is_off_list: true,
-        bends: true,
         smallest_told_as: Some("delay_s"),
         ..Traits::NONE
     },

@@ -42,7 +42,6 @@ pub(super) static EFFECT: Effect = Effect {
     traits: Traits {
         shifts_time: true,
         is_off_list: true,
-        bends: true,
         ..Traits::NONE
     },
     build: |site, values| {

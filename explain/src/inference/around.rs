@@ -279,7 +279,7 @@ mod tests {
     use crate::inference::margins::AS_LIKELY;
     use crate::inference::nuisance;
     use crate::inference::state::State;
-    use crate::inference::variants;
+    use crate::inference::{tangents, variants};
 
     #[test]
     fn each_neighbour_has_the_value_that_it_has_by_itself() {
@@ -307,7 +307,7 @@ mod tests {
             1,
             &state.efforts,
         ));
-        let measured = variants::measured(&problem, &fit);
+        let measured = tangents::measured(&problem, &fit);
         state.estimate_noise(&fit, &nuisances, &given, &measured, true);
         let space = state.space(&nuisances);
         let objective = Objective::new(&space, &measured, given);

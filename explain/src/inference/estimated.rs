@@ -9,7 +9,7 @@ use crate::physics::active::{Active, Hypothesis};
 use super::objective::{Objective, Set};
 use super::state::State;
 use super::step::refined;
-use super::{nuisance, sharpen, variants};
+use super::{nuisance, sharpen, tangents, variants};
 
 /// Effects with their most probable numbers.
 pub struct Estimated {
@@ -36,7 +36,7 @@ pub fn estimated(
         let sizes = state.sizes(&fit);
         let nuisances = nuisance::of(problem, &fit, &sizes, bodies, state.scales);
         let all = variants::all(problem, &fit, optional, &state.efforts);
-        let measured = variants::measured(problem, &fit);
+        let measured = tangents::measured(problem, &fit);
         state.estimate_noise(&fit, &nuisances, &all, &measured, round == 0);
         let space = state.space(&nuisances);
         let mut objective = Objective::new(&space, &measured, all);

@@ -313,7 +313,7 @@ mod tests {
     use crate::fixture::{at_joint, problem_with};
     use crate::inference::nuisance;
     use crate::inference::state::State;
-    use crate::inference::variants;
+    use crate::inference::{tangents, variants};
 
     /// The gain by viscous friction that is measured as `share` of its usual size, whatever the noise is.
     fn gain(share: f64) -> f64 {
@@ -325,7 +325,7 @@ mod tests {
         let friction = [at_joint("viscous_friction", 0)];
         let mut given = variants::all(&problem, &fit, &friction, &state.efforts);
         given.truncate(1);
-        let measured = variants::measured(&problem, &fit);
+        let measured = tangents::measured(&problem, &fit);
         state.estimate_noise(&fit, &nuisances, &given, &measured, true);
         let space = state.space(&nuisances);
         let objective = Objective::new(&space, &measured, given);

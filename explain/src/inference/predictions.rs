@@ -9,7 +9,7 @@ use crate::fit::fitted::Fit;
 use super::left_out::LeftOut;
 use super::prior::Magnitude;
 use super::space::Space;
-use super::{rows, variants};
+use super::{rows, tangents};
 
 /// The columns of a fit's effects, scaled by their prior standard deviations, and the effort that they and the nuisances
 /// are to explain.
@@ -19,7 +19,7 @@ pub fn tangents(problem: &Problem, fit: &Fit, efforts: &[Magnitude]) -> (Vec<Col
         values: fit.residual.clone(),
     };
     let mut columns = Vec::new();
-    for (given, active) in variants::of_fit(problem, fit, efforts)
+    for (given, active) in tangents::of_fit(problem, fit, efforts)
         .iter()
         .zip(&fit.actives)
     {
@@ -62,7 +62,7 @@ impl<'a> Predictions<'a> {
     ) -> Option<Self> {
         let pieces = rows::pieces(problem);
         let (columns, measured) = tangents(problem, fit, efforts);
-        let given = variants::of_fit(problem, fit, efforts);
+        let given = tangents::of_fit(problem, fit, efforts);
         let lasts = given.iter().flat_map(|given| {
             let hypothesis = given.variant.hypothesis;
             let lasts = hypothesis.lasts() && !hypothesis.is_torque_scale();

@@ -1,8 +1,10 @@
-//! The shape of each hypothesis next to an explanation, where that is best.
+//! Each hypothesis next to an explanation, at the numbers where it is best.
 //!
 //! A grid is too coarse for a resonance, a gap or a limit. So the shape that scores best on the grid is improved by steps
 //! of Gauss and Newton: the derivatives with respect to the shape are further columns, whose coefficients have the width of
-//! the grid as their prior (Nocedal and Wright, *Numerical Optimization*, 2006, section 10.3).
+//! the grid as their prior (Nocedal and Wright, *Numerical Optimization*, 2006, section 10.3). An effect that is linear
+//! in its factors to first order only is linearised again at the factors that it has there: at zero, the tangent of a
+//! moved centre of mass lacks the parallel-axis theorem.
 
 use nalgebra::DVector;
 use tauscope_dynamics::terms::{CoordinateKind, Scale};
@@ -18,6 +20,8 @@ use super::around::Around;
 use super::objective::{Objective, Set};
 use super::prior::Magnitude;
 use super::refine::bounds;
+use super::space::Whitened;
+use super::tangents;
 use super::variants::{self, Given};
 
 /// Most steps. Resolution: bounds the computing time; each halves what is left or more.
@@ -44,7 +48,8 @@ pub fn sharpened(
     for variant in &objective.variants {
         let hypothesis = variant.hypothesis;
         let is_new = !shaped.contains(&hypothesis);
-        if is_new && !hypothesis.is_linear() && variant.curve.is_none() {
+        let is_exact = hypothesis.is_linear() && !hypothesis.effect.bends();
+        if is_new && !is_exact && variant.curve.is_none() {
             shaped.push(hypothesis);
         }
     }
@@ -90,15 +95,18 @@ pub fn sharpened(
             hypothesis: *hypothesis,
             count: own.len(),
         };
-        let starts = maxima(&all).into_iter();
-        let found = starts.filter_map(|v| search.from(&objective.variants[v].shape));
+        // Where the recordings speak against a hypothesis at its best, a better shape nearby is not expected.
+        let variant = |v: usize| &objective.variants[v];
+        let is_favoured = |&(v, gain): &(usize, f64)| gain > variant(v).log_prior;
+        let starts = maxima(&all).into_iter().filter(is_favoured).map(|(v, _)| v);
+        let found = starts.filter_map(|v| search.from(&variant(v).shape));
         found.collect::<Vec<Given>>()
     };
     parallel::map(&shaped, of).into_iter().flatten().collect()
 }
 
 /// The best variants of a grid of which no neighbour is better: an objective may have several maxima.
-fn maxima(gains: &[(usize, f64)]) -> Vec<usize> {
+fn maxima(gains: &[(usize, f64)]) -> Vec<(usize, f64)> {
     let gain = |at: Option<usize>| at.and_then(|at| gains.get(at)).map_or(f64::MIN, |g| g.1);
     let is_top = |&at: &usize| {
         let own = gains[at].1;
@@ -107,7 +115,7 @@ fn maxima(gains: &[(usize, f64)]) -> Vec<usize> {
     let mut tops: Vec<usize> = (0..gains.len()).filter(is_top).collect();
     tops.sort_by(|&a, &b| gains[b].1.total_cmp(&gains[a].1));
     tops.truncate(MAXIMA);
-    tops.into_iter().map(|at| gains[at].0).collect()
+    tops.into_iter().map(|at| gains[at]).collect()
 }
 
 /// The search for the shape of one hypothesis.
@@ -128,7 +136,7 @@ impl Search<'_> {
         let mut best = self.at(shape.to_vec())?;
         let first = best.1;
         for _ in 0..STEPS {
-            let Some(step) = self.step(&best.0) else {
+            let Some(step) = self.step(&best.0).filter(|step| !step.is_empty()) else {
                 break;
             };
             let before = best.1;
@@ -147,7 +155,37 @@ impl Search<'_> {
                 break;
             }
         }
+        for _ in 0..STEPS {
+            if !self.hypothesis.effect.bends() {
+                break;
+            }
+            let before = best.1;
+            let Some(other) = self.linearised(&best.0).filter(|other| other.1 > before) else {
+                break;
+            };
+            best = other;
+            if best.1 < before + LEAST_GAIN {
+                break;
+            }
+        }
         (best.1 > first + LEAST_GAIN).then_some(best.0)
+    }
+
+    /// The hypothesis as its tangent at the factors that it has here, and its gain.
+    fn linearised(&self, given: &Given) -> Option<(Given, f64)> {
+        let factors = self.factors(given, &self.objective.whitened(given))?;
+        let active = given.variant.with(&factors);
+        let tangent = tangents::tangent(self.problem, self.fit, &active, self.count, self.efforts);
+        let gain = self.gain(&tangent);
+        Some((tangent, gain))
+    }
+
+    /// The gain by a hypothesis \[nats\].
+    fn gain(&self, given: &Given) -> f64 {
+        let whitened = self.objective.whitened(given);
+        let (own, right) = self.beside.products(&whitened);
+        let gram = self.objective.products(&whitened);
+        self.objective.gain(&given.variant, &gram, &own, &right)
     }
 
     /// The hypothesis at a shape, and its gain.
@@ -160,10 +198,7 @@ impl Search<'_> {
             self.count,
             self.efforts,
         )?;
-        let whitened = self.objective.whitened(&given);
-        let (own, right) = self.beside.products(&whitened);
-        let gram = self.objective.products(&whitened);
-        let gain = self.objective.gain(&given.variant, &gram, &own, &right);
+        let gain = self.gain(&given);
         Some((given, gain))
     }
 
@@ -196,35 +231,29 @@ impl Search<'_> {
         all.filter_map(of).collect()
     }
 
+    /// The most probable factors of a hypothesis with these columns, one by one at their bounds.
+    fn factors(&self, given: &Given, whitened: &[Whitened]) -> Option<Vec<f64>> {
+        let variant = &given.variant;
+        let solved = self.solved(whitened, given.alone.is_some())?;
+        let numbers = solved
+            .iter()
+            .zip(&variant.deviations)
+            .zip(&variant.positive);
+        let factor = |((mean, deviation), positive): ((&f64, &f64), &bool)| {
+            let value = mean * deviation;
+            if *positive { value.max(0.0) } else { value }
+        };
+        Some(numbers.map(factor).collect())
+    }
+
     /// The step of Gauss and Newton: changes of the shape's coordinates.
     fn step(&self, given: &Given) -> Option<Vec<(usize, f64)>> {
         let (problem, variant) = (self.problem, &given.variant);
+        let coordinates = self.coordinates(&variant.shape);
         let whitened = self.objective.whitened(given);
-        let offset = usize::from(given.alone.is_some());
-        let (own, mut right) = self.beside.products(&whitened);
-        if offset == 1 {
-            right -= own.column(0);
-        }
-        let q = variant.deviations.len();
-        let mut normal = own.view((offset, offset), (q, q)).into_owned();
-        for i in 0..q {
-            normal[(i, i)] += 1.0;
-        }
-        let means = normal
-            .cholesky()?
-            .solve(&right.rows(offset, q).into_owned());
-        let factors: Vec<f64> = means
-            .iter()
-            .zip(&variant.deviations)
-            .zip(&variant.positive)
-            .map(|((mean, deviation), positive)| {
-                let value = mean * deviation;
-                if *positive { value.max(0.0) } else { value }
-            })
-            .collect();
+        let factors = self.factors(given, &whitened)?;
         let here = effort(given, &factors);
         let active = variant.with(&factors);
-        let coordinates = self.coordinates(&variant.shape);
         let derivative = |&(c, width): &(usize, f64)| {
             let (_, upper) = bounds(problem, &active, c);
             let step = step_of(problem, &active, c);
@@ -255,21 +284,26 @@ impl Search<'_> {
             let objective = self.objective;
             all.push(objective.space.column(&column, 1.0, &objective.measured));
         }
-        let (own, mut right) = self.beside.products(&all);
-        if offset == 1 {
+        let solved = self.solved(&all, given.alone.is_some())?;
+        let steps = coordinates.iter().zip(solved.iter().skip(factors.len()));
+        Some(steps.map(|(&(c, width), x)| (c, x * width)).collect())
+    }
+
+    /// The most probable coefficients of columns, in prior standard deviations. With `offset`, the first column is one
+    /// whose coefficient is one.
+    fn solved(&self, columns: &[Whitened], offset: bool) -> Option<DVector<f64>> {
+        let (own, mut right) = self.beside.products(columns);
+        if offset {
             right -= own.column(0);
         }
-        let m = own.nrows() - offset;
-        let mut normal = own.view((offset, offset), (m, m)).into_owned();
+        let first = usize::from(offset);
+        let m = own.nrows() - first;
+        let mut normal = own.view((first, first), (m, m)).into_owned();
         for i in 0..m {
             normal[(i, i)] += 1.0;
         }
-        let solved: DVector<f64> = normal
-            .cholesky()?
-            .solve(&right.rows(offset, m).into_owned());
-        let solved = solved.rows(q, m - q);
-        let steps = coordinates.iter().zip(solved.iter());
-        Some(steps.map(|(&(c, width), x)| (c, x * width)).collect())
+        let right = right.rows(first, m).into_owned();
+        Some(normal.cholesky()?.solve(&right))
     }
 
     /// A shape after a share of a step, within its bounds.
@@ -318,6 +352,7 @@ mod tests {
     fn the_best_maxima_of_a_grid_come_first() {
         let gains = [1.0, 5.0, 2.0, 2.0, 9.0, f64::NEG_INFINITY, 3.0];
         let gains: Vec<(usize, f64)> = (10..).zip(gains).collect();
-        assert_eq!(maxima(&gains), [14, 11, 16]);
+        let tops: Vec<usize> = maxima(&gains).into_iter().map(|(v, _)| v).collect();
+        assert_eq!(tops, [14, 11, 16]);
     }
 }

@@ -17,8 +17,9 @@ use super::prior::Magnitude;
 use super::remainder;
 use super::rows::{Rows, pieces};
 use super::space::Space;
+use super::tangents;
 use super::temper;
-use super::variants::{self, Given};
+use super::variants::Given;
 
 /// Factor between two scales of the errors of bodies or laws that are compared. Resolution: of an estimate that some ten
 /// bodies allow.
@@ -143,11 +144,11 @@ impl<'a> State<'a> {
     /// Estimates how far bodies and laws are off (empirical Bayes), next to the effects of a fit.
     pub fn estimate_scales(&mut self, fit: &Fit, sizes: &[Size]) {
         let problem = self.problem;
-        let measured = variants::measured(problem, fit);
+        let measured = tangents::measured(problem, fit);
         let value = |state: &Self, scales: [f64; 2]| {
             let nuisances = nuisance::of(problem, fit, sizes, state.bodies, scales);
             let space = state.space(&nuisances);
-            let given = variants::of_fit(problem, fit, &state.efforts);
+            let given = tangents::of_fit(problem, fit, &state.efforts);
             let own = Objective::new(&space, &measured, given);
             let all: Set = (0..own.variants.len()).collect();
             space.evidence(&measured) + own.score(&all) - disfavour(scales)
@@ -249,7 +250,7 @@ fn friction_rms(problem: &Problem, fit: &Fit, rows: &Rows, joint: usize) -> f64 
             known.copied().unwrap_or(0.0)
         };
         let known = [known(&COULOMB_FRICTION), known(&VISCOUS_FRICTION)];
-        let left = rows.pick(&variants::measured(problem, fit).values[problem.joint_rows(joint)]);
+        let left = rows.pick(&tangents::measured(problem, fit).values[problem.joint_rows(joint)]);
         let stated = columns[0].iter().zip(&columns[1]);
         let stated = stated.map(|(sign, speed)| known[0] * sign + known[1] * speed);
         left.iter()
@@ -293,8 +294,8 @@ mod tests {
         let mut state = State::new(&problem, true);
         let sizes = state.sizes(&fit);
         let nuisances = nuisance::of(&problem, &fit, &sizes, true, state.scales);
-        let given = variants::of_fit(&problem, &fit, &state.efforts);
-        let measured = variants::measured(&problem, &fit);
+        let given = tangents::of_fit(&problem, &fit, &state.efforts);
+        let measured = tangents::measured(&problem, &fit);
         state.estimate_noise(&fit, &nuisances, &given, &measured, false);
         for (noise, effort) in state.noises.iter().zip(&state.efforts) {
             assert!(noise.slow < 0.05 * effort.rms, "{noise:?}");

@@ -12,7 +12,8 @@ use super::refine::{self, Solution};
 use super::search;
 use super::space::Space;
 use super::state::State;
-use super::variants::{self, Variant};
+use super::tangents;
+use super::variants::Variant;
 
 /// Smallest share of a predicted gain that a step must have. Chosen: a half, between the quarter and the three quarters of
 /// Nocedal and Wright, algorithm 4.1.
@@ -96,8 +97,8 @@ impl Step<'_> {
         let (problem, space) = (self.problem, self.space);
         let mut solution = refined(problem, space, self.objective, set);
         loop {
-            let given = variants::of_fit(problem, &solution.fit, &self.state.efforts);
-            let measured = variants::measured(problem, &solution.fit);
+            let given = tangents::of_fit(problem, &solution.fit, &self.state.efforts);
+            let measured = tangents::measured(problem, &solution.fit);
             let own = Objective::new(space, &measured, given);
             let all: Set = (0..own.variants.len()).collect();
             let kept = search::without_idle(&own, all.clone());

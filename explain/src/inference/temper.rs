@@ -61,7 +61,7 @@ mod tests {
     use crate::fixture::problem_with;
     use crate::inference::nuisance;
     use crate::inference::state::State;
-    use crate::inference::variants;
+    use crate::inference::tangents;
 
     /// The weight of the second joint's likelihood, where no effect explains its effort.
     fn weight(add: impl FnMut(&[f64], &[f64], &mut [f64])) -> f64 {
@@ -70,7 +70,7 @@ mod tests {
         let fit = Fit::new(&problem, Vec::new());
         let sizes = state.sizes(&fit);
         let nuisances = nuisance::of(&problem, &fit, &sizes, true, state.scales);
-        let measured = variants::measured(&problem, &fit);
+        let measured = tangents::measured(&problem, &fit);
         state.estimate_noise(&fit, &nuisances, &[], &measured, true);
         state.estimate_tempers(&fit, &nuisances, &[], &measured);
         state.tempers[1]

@@ -15,6 +15,7 @@ use crate::propose::{times, wall};
 
 use super::curves::{self, Curve};
 use super::prior::{self, Magnitude};
+use super::tangents;
 
 /// Effort below which a column is silent, as a share of the joint's. Resolution: of the rounding of efforts.
 const SILENT: f64 = 1e-9;
@@ -65,7 +66,7 @@ impl Variant {
     /// Whether several joints feel it and its effort is not linear in its numbers: a tangent says little of it.
     pub fn bends(&self) -> bool {
         let hypothesis = self.hypothesis;
-        let is_bent = !hypothesis.is_linear() || hypothesis.effect.traits.bends;
+        let is_bent = !hypothesis.is_linear() || hypothesis.effect.bends();
         is_bent && hypothesis.only_joint().is_none()
     }
 
@@ -149,7 +150,7 @@ pub struct Given {
 
 impl Given {
     /// Makes it a curve, where its columns are those of the curve's values.
-    fn shape(&mut self, curve: Curve, sizes: &[Magnitude]) {
+    pub fn shape(&mut self, curve: Curve, sizes: &[Magnitude]) {
         self.factors = curve.mixed(&self.factors);
         let free = self.factors.len();
         let usual = prior::USUAL_SHARE * sizes[curve.hypothesis.place.joint].rms;
@@ -176,7 +177,7 @@ pub fn all(
     hypotheses: &[Hypothesis],
     sizes: &[Magnitude],
 ) -> Vec<Given> {
-    let mut all = of_fit(problem, fit, sizes);
+    let mut all = tangents::of_fit(problem, fit, sizes);
     let of = |hypothesis: &Hypothesis| -> Vec<Given> {
         if *hypothesis.effect == UNKNOWN {
             return of_curves(problem, fit, hypothesis.place.joint, sizes);
@@ -213,78 +214,6 @@ fn of_curves(problem: &Problem, fit: &Fit, joint: usize, sizes: &[Magnitude]) ->
     all.into_iter().filter_map(of).collect()
 }
 
-/// The effects of a fit as they are, one each, in their order.
-pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[Magnitude]) -> Vec<Given> {
-    let jacobian = fit.jacobian(problem);
-    let own_efforts = fit.own_efforts(problem);
-    let free = fit.parameters();
-    let of = |(i, active): (usize, &Active)| {
-        let own = free.iter().zip(&jacobian);
-        let own = own.filter(|((of, c), _)| *of == i && fit.is_factor(i, *c));
-        let factors: Vec<(f64, Arc<Column>)> = own
-            .map(|((_, c), column)| {
-                let centre = prior::centre(problem, active.hypothesis);
-                (active.coordinates[*c] - centre, Arc::clone(column))
-            })
-            .collect();
-        // The intercept of the tangent: the effect's effort less that of its factors.
-        let joint = active.hypothesis.only_joint();
-        let mut alone = own_efforts[i].clone();
-        for (factor, column) in &factors {
-            for (k, value) in alone.values.iter_mut().enumerate() {
-                let of = match (joint, column.joint) {
-                    (Some(_), Some(_)) | (None, None) => column.values[k],
-                    (Some(own), None) => column.values[own * problem.rows + k],
-                    (None, Some(own)) if k / problem.rows == own => column.values[k % problem.rows],
-                    (None, Some(_)) => 0.0,
-                };
-                *value -= factor * of;
-            }
-        }
-        let largest = alone
-            .values
-            .iter()
-            .fold(0.0_f64, |most, x| most.max(x.abs()));
-        let most_effort = sizes.iter().map(|size| size.rms).fold(0.0, f64::max);
-        let alone = (largest > 1e-6 * most_effort).then_some(alone);
-        let factors: Vec<Arc<Column>> = factors.into_iter().map(|(_, column)| column).collect();
-        // At its best shape an effect is as probable beforehand as at any other of its grid.
-        let count = match active.hypothesis.time_kind() {
-            TimeKind::Always => shapes(problem, active.hypothesis).len(),
-            _ => 1,
-        };
-        let mut given = given(
-            problem,
-            active.hypothesis,
-            active.shape(),
-            (alone, factors),
-            count,
-            sizes,
-        );
-        if let Some(table) = &active.curve {
-            given.shape(Curve::new(table.clone(), active.hypothesis), sizes);
-        }
-        given
-    };
-    fit.actives.iter().enumerate().map(of).collect()
-}
-
-/// The measured effort, less what the twin without the effects of `fit` explains, as far as that is the sum of the
-/// effects' own efforts.
-pub fn measured(problem: &Problem, fit: &Fit) -> Column {
-    let mut values = fit.residual.clone();
-    for own in fit.own_efforts(problem) {
-        let first = own.joint.map_or(0, |joint| joint * problem.rows);
-        for (value, add) in values[first..].iter_mut().zip(&own.values) {
-            *value += add;
-        }
-    }
-    Column {
-        joint: None,
-        values,
-    }
-}
-
 /// A hypothesis at one of the `count` shapes of its grid; `None` if it changes no compared row.
 pub fn at(
     problem: &Problem,
@@ -301,7 +230,7 @@ pub fn at(
 }
 
 /// A variant with its columns.
-fn given(
+pub fn given(
     problem: &Problem,
     hypothesis: Hypothesis,
     shape: Vec<f64>,
@@ -368,29 +297,5 @@ fn given(
         alone,
         factors,
         is_silent,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::fixture::{at_joint, problem_with};
-
-    /// Guards the indices of the effects of a fit: a delay that was refined to zero changes no row.
-    #[test]
-    fn an_effect_that_changes_nothing_keeps_its_place() {
-        let problem = problem_with(4, |_, _, _| {});
-        let actives = vec![
-            at_joint("torque_delay", 0).with(vec![0.0]),
-            at_joint("viscous_friction", 1).with(vec![0.5]),
-        ];
-        let fit = Fit::new(&problem, actives);
-        let one = Magnitude {
-            rms: 1.0,
-            peak: 1.0,
-        };
-        let given = of_fit(&problem, &fit, &[one, one]);
-        let silent: Vec<bool> = given.iter().map(|given| given.is_silent).collect();
-        assert_eq!(silent, [true, false]);
     }
 }

@@ -38,7 +38,7 @@ pub fn add(
         if problem.rows <= MOST_ROWS && hypothesis.has_rotor() {
             term.expand(problem.expansion(hypothesis.place.joint));
         }
-        if problem.rows <= MOST_ROWS && hypothesis.effect.traits.bends {
+        if problem.rows <= MOST_ROWS && hypothesis.effect.bends() {
             term.know_recorded(match carrier {
                 Some(carrier) => carrier.recorded(problem),
                 None => problem

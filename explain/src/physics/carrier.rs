@@ -8,7 +8,7 @@
 use std::sync::{Arc, OnceLock};
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::Layer;
+use tauscope_dynamics::terms::{Layer, PlaceKind};
 
 use crate::data::problem::Problem;
 use crate::physics::act::recorded;
@@ -64,7 +64,8 @@ pub fn carrier(model: &Model, actives: &[Active]) -> Option<Carrier> {
 /// Whether an effect acts on whatever else was found: on the bodies that the arm carries, or on the base that leans.
 pub fn is_on_carrier(active: &Active) -> bool {
     let effect = active.hypothesis.effect;
-    effect.layer == Layer::Body && effect.traits.bends || is_for_a_while(active)
+    let is_motion = effect.layer == Layer::Body && effect.place != PlaceKind::Link;
+    is_motion && effect.bends() || is_for_a_while(active)
 }
 
 fn is_for_a_while(active: &Active) -> bool {

@@ -215,7 +215,7 @@ pub fn is_kept(problem: &Problem, active: &Active) -> bool {
         )
     };
     active.curve.is_none()
-        && !active.hypothesis.effect.traits.bends
+        && !active.hypothesis.effect.bends()
         && active.hypothesis.effect.coordinates.iter().all(timeless)
         && problem.rows <= MOST_ROWS
 }

@@ -1,6 +1,6 @@
 //! The stages of a group, and the routing of their samples.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::{Post, Turn};
 use crate::link::{LinkError, Sender, SenderCounts};
