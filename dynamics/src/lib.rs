@@ -47,6 +47,8 @@ pub mod lowpass;
 mod model;
 mod regressor;
 mod rnea;
+mod rollout;
+mod servo;
 mod sines;
 pub mod terms;
 mod unwrap;
@@ -64,4 +66,6 @@ pub use model::{
 };
 pub use regressor::regressor;
 pub use rnea::{gravity_effort, rnea};
+pub use rollout::ClosedLoop;
+pub use servo::{Commands, Feedforward, Observed, Servo};
 pub use unwrap::Unwrap;

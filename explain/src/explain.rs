@@ -214,6 +214,7 @@ fn conclude(
         holdout_rms_after: proof.after,
         noise_floor,
         holdout_predictions: BTreeMap::new(),
+        simulated: None,
     };
     progress(1.0, "writing the report");
     let (gain, gain_deviation) = context.final_gains(&found, &named.gain_deviation);
@@ -277,6 +278,7 @@ fn not_evaluated(input: &Input, joints: Vec<String>, reason: String) -> Outcome 
             holdout_rms_after: nan.clone(),
             noise_floor: nan,
             holdout_predictions: BTreeMap::new(),
+            simulated: None,
         },
         terms: Vec::new(),
         gain: Vec::new(),

@@ -132,9 +132,8 @@ pub fn infer(
                 alternatives,
                 smallest: around::smallest(&objective, &taken.set),
                 bodies: nuisance::mean_bodies(&nuisances, solution.nuisances.as_slice()),
-                unpredictive: predictions.map_or_else(Vec::new, |predictions| {
-                    predictions.unpredictive(&solution.fit)
-                }),
+                unpredictive: predictions
+                    .map_or_else(Vec::new, |predictions| predictions.unpredictive()),
                 remaining: remainder::predicted(&space, &residuals, &features),
                 fit: solution.fit,
             };

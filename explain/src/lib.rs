@@ -20,5 +20,5 @@ pub use explain::explain;
 pub use measure::{Measured, Number, measure};
 pub use outcome::Outcome;
 pub use read::input::Input;
-pub use read::recording::{Losses, Recording, RecordingTopics};
+pub use read::recording::{Losses, Recording, RecordingTopics, Series};
 pub use read::start::Start;

@@ -15,6 +15,7 @@ mod number_format;
 mod proof;
 mod rivals;
 mod robot;
+pub mod rollout;
 mod todo;
 mod tone;
 mod traces;
@@ -61,6 +62,8 @@ pub struct Around<'a> {
     pub twin: Option<String>,
     /// Path of the corrected robot, if one was written.
     pub corrected_robot: Option<String>,
+    /// Motion of the simulated arm under the recorded commands, if there are any.
+    pub rollout: Option<&'a rollout::Rollout>,
 }
 
 pub use groups::largest_first;
@@ -78,6 +81,11 @@ pub fn page(report: &Report, pictures: &[RecordingPicture], around: &Around<'_>)
         ),
         Section::of("where", "Where the mismatch is", proof::located(report)),
         Section::of("proof", "Before and after", proof::before_and_after(report)),
+        Section::of(
+            "rollout",
+            "Simulated under the same commands",
+            around.rollout.map(rollout::section),
+        ),
         Section::of(
             "pictures",
             "Joint by joint",

@@ -25,6 +25,7 @@ fn empty(verdict: Verdict) -> Report {
         remaining: Vec::new(),
         noise_floor: vec![0.1, 0.1],
         holdout_predictions: BTreeMap::new(),
+        simulated: None,
     }
 }
 
@@ -216,6 +217,7 @@ fn text_is_escaped() {
         twin: Some(nasty.to_owned()),
         corrected_robot: Some(nasty.to_owned()),
         model: None,
+        rollout: None,
     };
     let page = page(&report, &[drawn], &around);
     assert_well_formed(&page);

@@ -51,6 +51,9 @@ pub struct Args {
     /// Topic of the measured joint states; by default the one with efforts of most of the robot's joints.
     #[arg(long, value_name = "TOPIC")]
     state_topic: Option<String>,
+    /// Topic of the commanded positions; the report then shows what the simulated arm does under these commands.
+    #[arg(long, value_name = "TOPIC")]
+    command_topic: Option<String>,
     /// An effect, or a fault of recordings such as `effort_unit`, that is excluded; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
@@ -85,6 +88,7 @@ impl Args {
             ("--twin", self.twin.is_some()),
             ("--twin-topic", self.twin_topic.is_some()),
             ("--state-topic", self.state_topic.is_some()),
+            ("--command-topic", self.command_topic.is_some()),
             ("another file", self.inputs.len() > 1),
         ];
         if let Some((what, _)) = beside.iter().find(|(_, given)| *given) {
@@ -112,6 +116,7 @@ impl Args {
             twin: self.twin.as_deref(),
             twin_topic: self.twin_topic.as_deref(),
             state_topic: self.state_topic.as_deref(),
+            command_topic: self.command_topic.as_deref(),
             fit: &fit,
             holdout: &self.holdout,
         };

@@ -117,6 +117,7 @@ fn request(args: &Args, recordings: &[PathBuf]) -> Result<(Request, String), Fai
                 twin: args.twin.as_deref(),
                 twin_topic: None,
                 state_topic: Some(&args.state_topic),
+                command_topic: None,
                 fit: recordings,
                 holdout: &[],
             },

@@ -31,6 +31,8 @@ pub struct Request {
     pub topic_of_messages: Option<String>,
     /// Topic of an external twin.
     pub twin_topic: Option<String>,
+    /// Topic of the commanded positions.
+    pub command_topic: Option<String>,
     /// A corrected twin to start from.
     pub start: Option<StartFile>,
     /// Recordings to fit.
@@ -65,6 +67,7 @@ impl Request {
             twin,
             twin_topic: None,
             state_topic: Some(state_topic.to_owned()),
+            command_topic: None,
             fit: recordings.to_vec(),
             holdout: Vec::new(),
             problem: &|_, title| Problem::new(title),
@@ -108,6 +111,8 @@ pub struct Arguments<'a> {
     pub twin_topic: Option<&'a str>,
     /// Topic of the measured joint states; by default the one with efforts of most joints.
     pub state_topic: Option<&'a str>,
+    /// Topic of the commanded positions.
+    pub command_topic: Option<&'a str>,
     /// Recordings to fit.
     pub fit: &'a [PathBuf],
     /// Recordings that are held out from the fit.
@@ -174,6 +179,7 @@ pub fn from_case(path: &Path, without: BTreeSet<String>) -> Result<Request, Repo
         twin: model.map(|model| file.resolve(model)),
         twin_topic,
         state_topic: Some(case.topics.state.clone()),
+        command_topic: case.topics.command.clone(),
         fit: case.fit.iter().map(|path| file.resolve(path)).collect(),
         holdout: case.holdout.iter().map(|path| file.resolve(path)).collect(),
         problem: &|spot, title| match spot {
@@ -211,6 +217,7 @@ pub fn from_arguments(
         twin: arguments.twin.map(Path::to_owned),
         twin_topic: arguments.twin_topic.map(str::to_owned),
         state_topic: arguments.state_topic.map(str::to_owned),
+        command_topic: arguments.command_topic.map(str::to_owned),
         fit: arguments.fit.to_vec(),
         holdout: arguments.holdout.to_vec(),
         problem: &|_, title| Problem::new(title),

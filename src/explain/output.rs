@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use tauscope_archive::whole_file;
-use tauscope_explain::Outcome;
 use tauscope_explain::report::{MOTION_PREFIX, Verdict};
+use tauscope_explain::{Outcome, Series};
+use tauscope_pipeline::cell::EffortUnit;
 use tauscope_report as html;
 use tauscope_report::models::{self, Corrections, Target};
+use tauscope_report::rollout::{self, Rollout};
 use tauscope_session::robot::{self, Source};
 
 use super::input::Request;
@@ -120,6 +122,16 @@ pub fn write(
     let twin = twin.transpose()?;
     let robot = is_handed_out.then(|| robot_text(request, kept, outcome, &mut made));
     let robot = robot.flatten();
+    let rollout = match rollout(request, kept, outcome).transpose() {
+        Ok(rollout) => rollout,
+        Err(why) => {
+            made.notes.push(format!(
+                "The arm was not simulated under the recorded commands: {why}."
+            ));
+            None
+        }
+    };
+    outcome.report.simulated = rollout.as_ref().map(Rollout::errors);
     let shown = |path: &Path| path.display().to_string();
     let (holdout, fit) = parted(request, &outcome.report.holdout_predictions);
     let around = html::Around {
@@ -134,6 +146,7 @@ pub fn write(
         corrected_robot: (robot.as_ref())
             .filter(|(name, _)| *name == ROBOT)
             .map(|(name, _)| pasted(out, name)),
+        rollout: rollout.as_ref(),
     };
     let put = |name: &str, text: &str, made: &mut Made| {
         let path = out.join(name);
@@ -155,7 +168,7 @@ pub fn write(
     }
     if evaluated {
         let path = out.join(PICTURE);
-        let shown = picture::of(&outcome.report, &outcome.pictures, kept);
+        let shown = picture::of(&outcome.report, &outcome.pictures, kept, rollout.as_ref());
         tauscope_record::write_explanation(&path, &shown).context("the picture")?;
         made.files.push(path);
     }
@@ -256,6 +269,45 @@ fn robot_text(
             None
         }
     }
+}
+
+/// Simulates the arm under the commands of the first held-out recording; nothing where none are named, or where the efforts
+/// are not in N m. An error says in words why it was not possible.
+fn rollout(request: &Request, kept: &Kept, outcome: &Outcome) -> Option<Result<Rollout, String>> {
+    let topic = request.command_topic.as_ref()?;
+    let is_torque = request.cell.facts.effort_unit == EffortUnit::Nm;
+    if !kept.bodies || !is_torque || !outcome.report.hands_out_twin() {
+        return None;
+    }
+    let corrections = Corrections::of(&kept.model, &outcome.terms, &outcome.report.findings);
+    let picture = outcome.pictures.iter().find(|picture| picture.held_out)?;
+    if corrections.is_empty() {
+        return None;
+    }
+    let named = request.holdout.iter().chain(&request.fit);
+    let path = &named
+        .clone()
+        .find(|named| named.name == picture.recording)?
+        .path;
+    let joints = &request.cell.facts.joint_names;
+    let commands = match Series::of_commands(path, topic, joints) {
+        Ok(commands) if commands.stamp_ns.is_empty() => return None,
+        Ok(commands) => commands,
+        Err(error) => return Some(Err(error.to_string())),
+    };
+    let times_s = &picture.joints.first()?.time_s;
+    let (mut from, mut row, mut rows) = (0, vec![0.0; joints.len()], Vec::new());
+    for time_s in times_s {
+        let stamp_ns = picture.start_ns + (time_s * 1e9).round() as i64;
+        commands.at(stamp_ns, &mut from, &mut row);
+        rows.extend_from_slice(&row);
+    }
+    Some(rollout::simulated(
+        &kept.model,
+        &corrections,
+        picture,
+        &rows,
+    ))
 }
 
 /// Returns the absolute path of a result, for a pipeline file in any folder: its relative paths start at that folder.

@@ -5,10 +5,17 @@ use tauscope_record::{
     ExplainedEvent, ExplainedJoint, ExplainedRecording, ExplainedRobot, Explanation,
 };
 
+use tauscope_report::rollout::Rollout;
+
 use super::read::Kept;
 
 /// Returns the content of the picture.
-pub fn of(report: &Report, pictures: &[RecordingPicture], kept: &Kept) -> Explanation {
+pub fn of(
+    report: &Report,
+    pictures: &[RecordingPicture],
+    kept: &Kept,
+    rollout: Option<&Rollout>,
+) -> Explanation {
     let events = report
         .findings
         .iter()
@@ -19,7 +26,24 @@ pub fn of(report: &Report, pictures: &[RecordingPicture], kept: &Kept) -> Explan
         text_markdown: text(report),
         recordings: pictures.iter().map(recording).collect(),
         events: events.collect(),
-        robot: kept.bodies.then(|| robot(report, kept)),
+        robot: kept.bodies.then(|| ExplainedRobot {
+            // The drawn robot moves as in the first recording.
+            ghost: rollout
+                .filter(|rollout| {
+                    pictures
+                        .first()
+                        .is_some_and(|p| p.recording == rollout.recording)
+                })
+                .map(|rollout| {
+                    rollout
+                        .joints
+                        .iter()
+                        .map(|joint| joint.before.clone())
+                        .collect()
+                })
+                .unwrap_or_default(),
+            ..robot(report, kept)
+        }),
     }
 }
 
@@ -39,6 +63,7 @@ fn robot(report: &Report, kept: &Kept) -> ExplainedRobot {
     ExplainedRobot {
         model: model.clone(),
         found: report.findings.iter().filter_map(link_of).collect(),
+        ghost: Vec::new(),
     }
 }
 

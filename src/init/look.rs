@@ -120,6 +120,7 @@ impl Told<'_> {
             twin: None,
             twin_topic: None,
             state_topic: self.state_topic,
+            command_topic: None,
             fit: self.recordings,
             holdout: &[],
         };

@@ -21,6 +21,7 @@ import subprocess
 import sys
 import time
 
+import mcap_ros2.writer
 import mujoco
 import numpy as np
 
@@ -43,6 +44,22 @@ CASES = {
     "arm7_zero": ("arm7", [("ref", "j4", 0.04), ("frictionloss", "j1", 2.), ("damping", "j5", 0.9)]),
     "arm7_recording": ("arm7", [("gain", "j2", 0.9), ("delay", "all", 0.016), ("armature", "j3", 0.3)]),
 }
+
+
+JOINT_STATE = """std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
 
 
 @dataclasses.dataclass
@@ -130,8 +147,9 @@ def simulate(m, controller, command):
     return Run(*(np.array(x) for x in zip(*rows)))
 
 
-def write(path, m, run, rng, changes=()):
-    """A table with noise of encoders and sensors, and the changes of the recording. Gives the efforts without the latter."""
+def write(path, m, run, rng, changes=(), command=None):
+    """A table with noise of encoders and sensors, and the changes of the recording. With commands, the same as messages, too.
+    Gives the efforts without the changes of the recording."""
     names = [m.joint(j).name for j in range(m.njnt)]
     size = np.sqrt(np.mean(run.effort**2, 0))
     q = run.position + 1e-5 * rng.standard_normal(run.position.shape)
@@ -146,7 +164,25 @@ def write(path, m, run, rng, changes=()):
     head = ["time"] + [f"{n}.{kind}" for n in names for kind in ("position", "velocity", "effort")]
     body = np.column_stack([run.time] + [x[:, j] for j in range(m.njnt) for x in (q, v, e)])
     np.savetxt(path, body, delimiter=",", header=",".join(head), comments="", fmt="%.9g")
+    if command is not None:
+        every = int(round(1 / RATE_HZ / STEP_S))
+        messages(path.with_suffix(".mcap"), names, run.time, {"/joint_states": (q, v, e), "/joint_commands": (command[::every], [], [])})
     return measured
+
+
+def messages(path, names, time_s, topics):
+    """An MCAP file of joint states: position, velocity and effort by topic, rows by joints."""
+    with open(path, "wb") as file:
+        writer = mcap_ros2.writer.Writer(file)
+        schema = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
+        for k, t in enumerate(time_s):
+            stamp_ns = int(round(t * 1e9)) + 1_700_000_000 * 10**9
+            header = {"stamp": {"sec": stamp_ns // 10**9, "nanosec": stamp_ns % 10**9}, "frame_id": ""}
+            for topic, columns in topics.items():
+                position, velocity, effort = (list(map(float, x[k])) if len(x) else [] for x in columns)
+                message = {"header": header, "name": names, "position": position, "velocity": velocity, "effort": effort}
+                writer.write_message(topic, schema, message, log_time=stamp_ns, publish_time=stamp_ns)
+        writer.finish()
 
 
 def make(out, name, seed):
@@ -162,14 +198,14 @@ def make(out, name, seed):
     for k in range(RECORDINGS):
         command = commands(plant, rng)
         run = simulate(plant, controller, command)
-        measured = write(folder / f"rec_{k}.csv", plant, run, rng, changes)
+        measured = write(folder / f"rec_{k}.csv", plant, run, rng, changes, command if k == HELD_OUT else None)
         np.savez_compressed(folder / f"rec_{k}.npz", command=command, measured=measured, **dataclasses.asdict(run))
 
 
 def explain(program, folder, model):
     fit = [str(folder / f"rec_{k}.csv") for k in range(RECORDINGS) if k != HELD_OUT]
-    command = [program, "explain", "--fit", *fit, "--holdout", str(folder / f"rec_{HELD_OUT}.csv"), "--robot",
-               str(folder / f"{model}.xml"), "--out", str(folder / "report"), "--force"]
+    command = [program, "explain", "--fit", *fit, "--holdout", str(folder / f"rec_{HELD_OUT}.mcap"), "--robot",
+               str(folder / f"{model}.xml"), "--command-topic", "/joint_commands", "--out", str(folder / "report"), "--force"]
     begin = time.time()
     subprocess.run(command, check=True, capture_output=True, text=True)
     (folder / "seconds.json").write_text(json.dumps(time.time() - begin))
@@ -231,21 +267,23 @@ def judge(program, folder, name):
     moves = np.abs(run.velocity) > MOVING
     found = [f"{f['effect']}@{f['joint'] or f['link'] or 'tool'}" for f in report["findings"]]
     return {"case": name, "changes": changes, "found": found, "inverse": {k: rms(x[moves]) for k, x in residuals.items()},
-            "rollout": [rms(x - run.position, 0) for x in rollouts], "measured": run.position, "paths": rollouts}
+            "rollout": [rms(x - run.position, 0) for x in rollouts], "said": report.get("simulated"), "measured": run.position, "paths": rollouts}
 
 
 def table(results):
-    lines = ["| case | concealed | found | residual before | after: report | MuJoCo | Pinocchio | Drake | rollout, before and after [mrad] | worse joints |",
-             "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | --- | --- |"]
+    lines = ["| case | concealed | found | residual before | after: report | MuJoCo | Pinocchio | Drake | rollout, before and after [mrad] | the report's | worse joints |",
+             "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | --- | --- | --- |"]
     ratios = []
     for r in results:
         rb, ra = (rms(x) for x in r["rollout"])
         worse = sum(a > b * 1.02 + 1e-6 for b, a in zip(*r["rollout"]))
         ratios.append(ra / rb)
         changes = ", ".join(f"{a} {n} +{x:g}" for a, n, x in r["changes"])
+        said = r["said"]
+        said = ", ".join(f"{1e3 * rms(np.array(said[k])):.2f}" for k in ("rms_before", "rms_after")) if said else "none"
         inverse = " | ".join(f"{x:.3f}" for x in r["inverse"].values())
         lines.append(f"| {r['case']} | {changes} | {', '.join(r['found'])} | {inverse} | "
-                     f"{1e3 * rb:.2f}, {1e3 * ra:.2f} | {worse} of {len(r['rollout'][0])} |")
+                     f"{1e3 * rb:.2f}, {1e3 * ra:.2f} | {said} | {worse} of {len(r['rollout'][0])} |")
     return "\n".join(lines) + f"\n\nThe rollout's error falls to {np.median(ratios):.3f} of what it was in the median of {len(ratios)} cases."
 
 

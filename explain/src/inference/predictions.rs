@@ -9,6 +9,7 @@ use crate::fit::fitted::Fit;
 use super::left_out::LeftOut;
 use super::prior::Magnitude;
 use super::space::Space;
+use super::variants::SILENT;
 use super::{rows, tangents};
 
 /// The columns of a fit's effects, scaled by their prior standard deviations, and the effort that they and the nuisances
@@ -48,8 +49,9 @@ pub struct Predictions<'a> {
     left_out: LeftOut<'a>,
     /// By column of the effects, whether its effect lasts.
     lasts: Vec<bool>,
+    /// By joint, whether an effect that lasts changes its effort.
+    felt: Vec<bool>,
     pieces: usize,
-    joints: usize,
 }
 
 impl<'a> Predictions<'a> {
@@ -69,11 +71,20 @@ impl<'a> Predictions<'a> {
             let count = usize::from(given.alone.is_some()) + given.factors.len();
             std::iter::repeat_n(lasts, count)
         });
+        let lasts: Vec<bool> = lasts.collect();
+        let lasting = || columns.iter().zip(&lasts).filter(|(_, lasts)| **lasts);
+        let is_felt = |joint: usize| {
+            let least = SILENT * efforts[joint].peak;
+            lasting().any(|(column, _)| {
+                let values = column.of_joint(joint, problem.rows).unwrap_or_default();
+                values.iter().any(|x| x.abs() > least)
+            })
+        };
         Some(Self {
-            lasts: lasts.collect(),
+            felt: (0..problem.joints).map(is_felt).collect(),
             left_out: LeftOut::new(space, &columns, &measured, pieces)?,
+            lasts,
             pieces,
-            joints: problem.joints,
         })
     }
 
@@ -85,12 +96,7 @@ impl<'a> Predictions<'a> {
 
     /// Joints whose effort is predicted no better with the effects that last than without them. A twin has no nuisances, so
     /// they predict nothing here.
-    pub fn unpredictive(&self, fit: &Fit) -> Vec<usize> {
-        let feels = |joint: &usize| {
-            let lasting = fit.actives.iter().map(|active| active.hypothesis);
-            let mut lasting = lasting.filter(|h| h.lasts() && !h.is_torque_scale());
-            lasting.any(|h| h.only_joint().is_none_or(|own| own == *joint))
-        };
+    pub fn unpredictive(&self) -> Vec<usize> {
         let nuisances = self.left_out.nuisances();
         let of_effects = |joint, piece| {
             let is_effect = |column: usize| column >= nuisances;
@@ -107,7 +113,7 @@ impl<'a> Predictions<'a> {
         pairs
             .filter(|(_, (with, without))| square(with) >= square(without))
             .map(|(joint, _)| joint)
-            .filter(feels)
+            .filter(|joint| self.felt[*joint])
             .collect()
     }
 
@@ -117,7 +123,7 @@ impl<'a> Predictions<'a> {
                 .map(|piece| of_piece(joint, piece))
                 .collect()
         };
-        (0..self.joints).map(of_joint).collect()
+        (0..self.felt.len()).map(of_joint).collect()
     }
 }
 
@@ -150,6 +156,6 @@ mod tests {
         let nuisances = nuisance::of(&problem, &fit, &sizes, true, state.scales);
         let space = state.space(&nuisances);
         let predictions = Predictions::of(&problem, &space, &fit, &state.efforts).unwrap();
-        assert_eq!(predictions.unpredictive(&fit), Vec::<usize>::new());
+        assert_eq!(predictions.unpredictive(), Vec::<usize>::new());
     }
 }

@@ -118,8 +118,61 @@ pub fn measured(problem: &Problem, fit: &Fit) -> Column {
 
 #[cfg(test)]
 mod tests {
+    use tauscope_dynamics::Inertia;
+    use tauscope_dynamics::terms::effect;
+
     use super::*;
-    use crate::fixture::{at_joint, problem_with};
+    use crate::fixture::{at_joint, model, problem, problem_with, recording};
+    use crate::physics::active::{Hypothesis, Whereabouts};
+
+    /// Guards against an inertia that did not follow a moved centre of mass, so that an unknown body fitted better.
+    #[test]
+    fn a_moved_centre_of_mass_moves_the_inertia_by_the_parallel_axis_theorem() {
+        let plain = model();
+        let link = plain.link_index("lower").unwrap();
+        let own = plain.links()[link].inertia;
+        let [x, y, z] = own.com_m();
+        let moved = Inertia::new(
+            own.mass_kg(),
+            [x + 0.15, y, z],
+            own.inertia_about_com_kgm2(),
+        );
+        let mut real = plain.clone();
+        real.attach(link, moved - own);
+        let recordings = [1, 2].map(|seed| recording(&real, seed, |_, _, _| {}));
+        let problem = problem(&plain, &recordings);
+        let hypothesis = Hypothesis {
+            effect: effect("link_com").unwrap(),
+            place: Whereabouts {
+                link,
+                ..Whereabouts::default()
+            },
+        };
+        let rms = |fit: &Fit| (fit.squares[1] / fit.count[1]).sqrt();
+        let exact = hypothesis.with(vec![0.15, 0.0, 0.0]);
+        let fit = Fit::new(&problem, vec![exact.clone()]);
+        let least = rms(&fit);
+        assert!(least < 0.01, "{least}");
+        // The tangent at zero leaves 2 kg times the square of 0.15 m.
+        let one = Magnitude {
+            rms: 1.0,
+            peak: 1.0,
+        };
+        let bare = Fit::new(&problem, Vec::new());
+        let explained = |given: &Given, factor: f64| -> f64 {
+            let alone = given.alone.as_ref().unwrap();
+            let rows = alone.values.iter().zip(&given.factors[0].values);
+            let left = bare
+                .residual
+                .iter()
+                .zip(rows)
+                .map(|(r, (a, x))| (r - a - factor * x).powi(2));
+            (left.skip(problem.rows).sum::<f64>() / problem.rows as f64).sqrt()
+        };
+        let [zero, there] = [hypothesis.with(vec![0.0; 3]), exact]
+            .map(|active| tangent(&problem, &bare, &active, 1, &[one, one]));
+        assert!(explained(&there, 0.15) < 0.02 && explained(&zero, 0.15) > 0.04);
+    }
 
     /// Guards the indices of the effects of a fit: a delay that was refined to zero changes no row.
     #[test]

@@ -18,7 +18,7 @@ use super::prior::{self, Magnitude};
 use super::tangents;
 
 /// Effort below which a column is silent, as a share of the joint's. Resolution: of the rounding of efforts.
-const SILENT: f64 = 1e-9;
+pub const SILENT: f64 = 1e-9;
 /// Usual number of times at which a change may happen. Resolution: that of the scan over a recording.
 const TIMES: f64 = 60.0;
 

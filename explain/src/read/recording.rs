@@ -14,6 +14,7 @@ use tauscope_session::{Assembler, Finding, Joints, Look, Plausible, SessionError
 pub use even_clock::EvenClock;
 pub use losses::Losses;
 pub use rate::{MAX_GAP_S, mean_step_s};
+pub use reference::Series;
 
 /// Smallest number of joints for which exact zeros at all of them are not a measurement. Fewer joints may be at zero
 /// by chance, with coarse quantisation.

@@ -52,6 +52,20 @@ pub struct Report {
     pub noise_floor: Vec<f64>,
     /// File with the corrected twin's effort, by held-out recording.
     pub holdout_predictions: BTreeMap<String, String>,
+    /// Motion of the simulated arm under the recorded commands, if there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulated: Option<Simulated>,
+}
+
+/// Errors of the simulated arm under the commands of a recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Simulated {
+    /// The recording.
+    pub recording: String,
+    /// RMS of simulated minus measured position of the robot's model as it is, by joint \[rad or m\].
+    pub rms_before: Vec<f64>,
+    /// RMS of simulated minus measured position of the corrected model, by joint \[rad or m\].
+    pub rms_after: Vec<f64>,
 }
 
 impl Report {

@@ -116,6 +116,37 @@ impl Corrections {
         self.joints.is_empty() && self.bodies.is_empty() && self.gravity.is_none()
     }
 
+    /// The robot with the corrections: its bodies, zeros and gravity, and the drives of its joints.
+    pub fn applied(&self, model: &Model) -> (Model, Vec<Drive>) {
+        let mut arm = model.clone();
+        for (name, inertia) in &self.bodies {
+            if let Some(link) = model.link_index(name) {
+                arm.attach(link, *inertia - model.links()[link].inertia);
+            }
+        }
+        if let Some(gravity) = self.gravity {
+            arm.set_gravity(gravity);
+        }
+        let mut drives: Vec<Drive> = Vec::new();
+        for (j, joint) in model.joints().iter().enumerate() {
+            let own = self.joints.get(&joint.name).copied().unwrap_or_default();
+            if let Some(zero) = own.zero {
+                arm.shift_zero(j, zero);
+            }
+            let [stiffness, rest] = own
+                .spring
+                .unwrap_or([joint.drive.stiffness, joint.drive.rest]);
+            drives.push(Drive {
+                damping: own.damping.unwrap_or(joint.drive.damping),
+                friction: own.friction.unwrap_or(joint.drive.friction),
+                rotor_inertia: own.armature.unwrap_or(joint.drive.rotor_inertia),
+                stiffness,
+                rest,
+            });
+        }
+        (arm, drives)
+    }
+
     /// Adds a term's inertia to its link, if the link is one of `named`.
     fn add_body(&mut self, model: &Model, spec: &TermSpec, named: &BTreeSet<usize>) {
         let body = body_of(model, spec).filter(|(link, _)| named.contains(link));

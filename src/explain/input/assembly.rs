@@ -48,6 +48,8 @@ pub struct Assembly<'a> {
     pub twin_topic: Option<String>,
     /// Topic of the measured joint states; by default the one with efforts of most joints.
     pub state_topic: Option<String>,
+    /// Topic of the commanded positions.
+    pub command_topic: Option<String>,
     /// Recordings to fit.
     pub fit: Vec<PathBuf>,
     /// Recordings that are held out from the fit.
@@ -125,6 +127,7 @@ impl Assembly<'_> {
             topic_of_messages: look.topic_of_messages().map(str::to_owned),
             state_topic: look.topic,
             twin_topic: self.twin_topic,
+            command_topic: self.command_topic,
             start,
             fit,
             holdout,

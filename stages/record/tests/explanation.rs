@@ -80,6 +80,7 @@ fn explanation() -> Explanation {
         robot: Some(ExplainedRobot {
             model: arm(),
             found: vec!["link3".to_owned()],
+            ghost: vec![vec![0.1; 500]; 6],
         }),
     }
 }
@@ -168,6 +169,8 @@ fn the_file_holds_efforts_residuals_events_text_and_layout() {
     let times = moved.timelines()[&"recording_time".into()].times_raw();
     assert_eq!((times[0], times[6]), (0, 20_000_000));
     assert!(recording.contains_key("/robot/link6"));
+    assert!(recording.contains_key("/uncorrected/robot/link6"));
+    assert_eq!(rows(&recording["/uncorrected/transforms"]), 6 * 500);
     assert!(
         blueprint
             .iter()

@@ -5,7 +5,8 @@
 //! corrected) and `<recording>/<joint>/residual` (before, after). Events are `<recording>/events/<number>`, with
 //! their text in `<recording>/log`. The robot of the first recording is `robot/<link>`, moved by `transforms`. The
 //! text is `explanation`. All use the importer's timelines, and `recording_time`, which starts at zero in each
-//! recording, so that recordings can be overlaid.
+//! recording, so that recordings can be overlaid. The uncorrected simulation under the same commands, if there is one, is
+//! `uncorrected/robot/<link>`.
 
 use std::path::Path;
 
@@ -29,6 +30,9 @@ use super::robot::Robot;
 use super::store::{Store, entity, unserializable};
 use super::tracks::{LOG_TIME, PUBLISH_TIME, STAMP, Times};
 use crate::error::RecordError;
+
+/// Parent entity of the uncorrected simulation.
+pub(super) const GHOST: &str = "uncorrected";
 
 /// Initial timeline of the picture: seconds from the start of each recording.
 pub(super) const RECORDING_TIME: &str = "recording_time";
@@ -57,6 +61,9 @@ pub struct ExplainedRobot {
     pub model: Model,
     /// The links with findings.
     pub found: Vec<String>,
+    /// Motion of the uncorrected simulation in the first recording: for each joint, a position for each of its samples
+    /// \[rad or m\]. Empty if it was not simulated.
+    pub ghost: Vec<Vec<f64>>,
 }
 
 /// A recording in the picture of an explanation.
@@ -157,22 +164,15 @@ impl Explanation {
         for link in &drawn.found {
             robot.paint(link, EVENT);
         }
-        for (row, time_s) in recording.joints[0].time_s.iter().enumerate() {
-            let mut position = [0.0; MAX_JOINTS];
-            let joints = recording.joints.iter();
-            for (to, joint) in position.iter_mut().zip(joints) {
-                *to = joint.position.get(row).copied().unwrap_or(f64::NAN);
-            }
-            if !(time_s.is_finite() && position.iter().all(|q| q.is_finite())) {
-                continue;
-            }
-            let stamp_ns = recording.start_ns.saturating_add(nanos(*time_s));
-            let header = Header {
-                stamp_ns,
-                received_ns: stamp_ns,
-                ..Header::default()
-            };
-            robot.pose(&header, &position);
+        let joints = recording.joints.iter();
+        let measured: Vec<&[f64]> = joints.map(|joint| &joint.position[..]).collect();
+        recording.pose(&mut robot, &measured);
+        if drawn.ghost.len() == dof {
+            let mut ghost = robot.beside(GHOST, times, store, &mut write)?;
+            ghost.paint_all(EXPECTED);
+            let simulated: Vec<&[f64]> = drawn.ghost.iter().map(|joint| &joint[..]).collect();
+            recording.pose(&mut ghost, &simulated);
+            ghost.flush(store, &mut write)?;
         }
         robot.flush(store, &mut write)?;
         Ok(Some(robot))
@@ -221,6 +221,26 @@ pub(super) fn events_of<'a>(
 }
 
 impl ExplainedRecording {
+    /// Moves a robot by positions, joint by joint, at the times of the recording.
+    fn pose(&self, robot: &mut Robot, joints: &[&[f64]]) {
+        for (row, time_s) in self.joints[0].time_s.iter().enumerate() {
+            let mut position = [0.0; MAX_JOINTS];
+            for (to, joint) in position.iter_mut().zip(joints) {
+                *to = joint.get(row).copied().unwrap_or(f64::NAN);
+            }
+            if !(time_s.is_finite() && position.iter().all(|q| q.is_finite())) {
+                continue;
+            }
+            let stamp_ns = self.start_ns.saturating_add(nanos(*time_s));
+            let header = Header {
+                stamp_ns,
+                received_ns: stamp_ns,
+                ..Header::default()
+            };
+            robot.pose(&header, &position);
+        }
+    }
+
     /// Time of the last sample \[s\].
     fn end_s(&self) -> f64 {
         let times = self.joints.iter().flat_map(|joint| &joint.time_s);

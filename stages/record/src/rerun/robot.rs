@@ -62,8 +62,31 @@ impl Robot {
         store: &Store,
         out: &mut Out<'_>,
     ) -> Result<Self, RecordError> {
+        Self::on(frame(prefix, root(model)), model, prefix, times, store, out)
+    }
+
+    /// Another robot on the base of this one.
+    pub fn beside(
+        &self,
+        prefix: &str,
+        times: impl Fn() -> Times,
+        store: &Store,
+        out: &mut Out<'_>,
+    ) -> Result<Self, RecordError> {
+        let base = frame("", root(&self.model));
+        Self::on(base, &self.model, prefix, times, store, out)
+    }
+
+    /// Draws the parts of a robot whose base has the frame `root`.
+    fn on(
+        root: String,
+        model: &Model,
+        prefix: &str,
+        times: impl Fn() -> Times,
+        store: &Store,
+        out: &mut Out<'_>,
+    ) -> Result<Self, RecordError> {
         let base = entity(prefix, &["robot"]);
-        let root = frame(prefix, root(model));
         out(store.always(&base, &CoordinateFrame::new(root.as_str()))?)?;
         let mut links = Vec::new();
         for (index, shapes) in shapes::of(model).into_iter().enumerate() {
@@ -189,6 +212,13 @@ impl Robot {
             &mut self.data,
             &position_rad[..self.model.dof()],
         );
+    }
+
+    /// Sets the permanent colour of all links.
+    pub fn paint_all(&mut self, colour: Rgba32) {
+        for link in &mut self.links {
+            link.colour = colour;
+        }
     }
 
     /// Sets the permanent colour of a link.

@@ -13,7 +13,7 @@ use rerun::log::LogMsg;
 use super::properties::Properties;
 use crate::error::RecordError;
 use crate::rerun::explanation::{
-    ExplainedRecording, Explanation, RECORDING_TIME, effort_entity, event_entity, events_of,
+    ExplainedRecording, Explanation, GHOST, RECORDING_TIME, effort_entity, event_entity, events_of,
     log_entity, residual_entity, text_entity,
 };
 use crate::rerun::robot::Robot;
@@ -71,7 +71,7 @@ fn left(
             .map_or("", |first| &first.name);
         let view = Spatial3DView::new(format!("Robot in {name}"))
             .with_origin(robot.entity().clone())
-            .with_contents([format!("{}/**", robot.entity())])
+            .with_contents([format!("{}/**", robot.entity()), format!("/{GHOST}/**")])
             .into();
         properties.look_at(&view, robot.view_point());
         views.push(view);
