@@ -103,7 +103,7 @@ pub fn infer(
         say("comparing explanations");
         let sizes = state.sizes(&fit);
         let nuisances = nuisance::of(problem, &fit, &sizes, bodies, state.scales);
-        let given = variants::all(problem, &fit, hypotheses, &state.efforts);
+        let given = tangents::all(problem, &fit, hypotheses, &state.efforts);
         let measured = tangents::measured(problem, &fit);
         state.estimate_noise(&fit, &nuisances, &given, &measured, false);
         let space = state.space(&nuisances);
@@ -168,7 +168,7 @@ fn begun(
     let sizes = state.sizes(&fit);
     let measured = tangents::measured(problem, &fit);
     let nuisances = nuisance::of(problem, &fit, &sizes, state.bodies, state.scales);
-    let given = variants::all(problem, &fit, hypotheses, &state.efforts);
+    let given = tangents::all(problem, &fit, hypotheses, &state.efforts);
     state.estimate_noise(&fit, &nuisances, &given, &measured, true);
     state.estimate_tempers(&fit, &nuisances, &linear_columns(&given), &measured);
     let starts: &[f64] = if state.bodies { &STARTS } else { &STARTS[..1] };
@@ -265,7 +265,7 @@ pub fn around(problem: &Problem, hypotheses: &[Hypothesis], fit: Fit, bodies: bo
     let mut state = State::new(problem, bodies);
     let sizes = state.sizes(&fit);
     let nuisances = nuisance::of(problem, &fit, &sizes, bodies, state.scales);
-    let given = variants::all(problem, &fit, hypotheses, &state.efforts);
+    let given = tangents::all(problem, &fit, hypotheses, &state.efforts);
     let measured = tangents::measured(problem, &fit);
     state.estimate_noise(&fit, &nuisances, &given, &measured, false);
     let space = state.space(&nuisances);

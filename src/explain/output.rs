@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use tauscope_archive::whole_file;
-use tauscope_explain::report::{MOTION_PREFIX, Verdict};
+use tauscope_explain::report::{MOTION_PREFIX, RecordingPicture, Verdict};
 use tauscope_explain::{Outcome, Series};
 use tauscope_pipeline::cell::EffortUnit;
 use tauscope_report as html;
@@ -116,22 +116,11 @@ pub fn write(
             .insert(recording.clone(), name);
         predictions.push(path);
     }
-    let evaluated = outcome.report.verdict != Verdict::NotEvaluated;
     let is_handed_out = outcome.report.hands_out_twin();
     let twin = is_handed_out.then(|| twin_text(request, kept, outcome, &provenance, &mut made));
     let twin = twin.transpose()?;
-    let robot = is_handed_out.then(|| robot_text(request, kept, outcome, &mut made));
-    let robot = robot.flatten();
-    let rollout = match rollout(request, kept, outcome).transpose() {
-        Ok(rollout) => rollout,
-        Err(why) => {
-            made.notes.push(format!(
-                "The arm was not simulated under the recorded commands: {why}."
-            ));
-            None
-        }
-    };
-    outcome.report.simulated = rollout.as_ref().map(Rollout::errors);
+    let robot = robot_text(request, kept, outcome, &mut made);
+    let rollout = rollout(request, kept, outcome, &mut made);
     let shown = |path: &Path| path.display().to_string();
     let (holdout, fit) = parted(request, &outcome.report.holdout_predictions);
     let around = html::Around {
@@ -166,7 +155,7 @@ pub fn write(
     if let Some((name, text)) = &robot {
         put(name, text, &mut made)?;
     }
-    if evaluated {
+    if outcome.report.verdict != Verdict::NotEvaluated {
         let path = out.join(PICTURE);
         let shown = picture::of(&outcome.report, &outcome.pictures, kept, rollout.as_ref());
         tauscope_record::write_explanation(&path, &shown).context("the picture")?;
@@ -242,7 +231,8 @@ fn robot_text(
     outcome: &Outcome,
     made: &mut Made,
 ) -> Option<(&'static str, String)> {
-    let urdf = request.cell.facts.urdf.as_ref().filter(|_| kept.bodies)?;
+    let is_written = kept.bodies && outcome.report.hands_out_twin();
+    let urdf = request.cell.facts.urdf.as_ref().filter(|_| is_written)?;
     let mut gains = outcome.gain.iter();
     let mut offsets = kept.start.iter().flat_map(|start| &start.offset);
     let is_bare = gains.all(|gain| (gain - 1.0).abs() < f64::EPSILON)
@@ -271,43 +261,54 @@ fn robot_text(
     }
 }
 
-/// Simulates the arm under the commands of the first held-out recording; nothing where none are named, or where the efforts
-/// are not in N m. An error says in words why it was not possible.
-fn rollout(request: &Request, kept: &Kept, outcome: &Outcome) -> Option<Result<Rollout, String>> {
+/// Simulates the arm under the commands of the first held-out recording, and adds its errors to the report; nothing where
+/// no commands are named, where nothing is corrected, or where the efforts are not in N m.
+fn rollout(
+    request: &Request,
+    kept: &Kept,
+    outcome: &mut Outcome,
+    made: &mut Made,
+) -> Option<Rollout> {
     let topic = request.command_topic.as_ref()?;
     let is_torque = request.cell.facts.effort_unit == EffortUnit::Nm;
-    if !kept.bodies || !is_torque || !outcome.report.hands_out_twin() {
-        return None;
-    }
     let corrections = Corrections::of(&kept.model, &outcome.terms, &outcome.report.findings);
-    let picture = outcome.pictures.iter().find(|picture| picture.held_out)?;
-    if corrections.is_empty() {
+    if !kept.bodies || !is_torque || !outcome.report.hands_out_twin() || corrections.is_empty() {
         return None;
     }
-    let named = request.holdout.iter().chain(&request.fit);
-    let path = &named
-        .clone()
-        .find(|named| named.name == picture.recording)?
-        .path;
+    let picture = outcome.pictures.iter().find(|picture| picture.held_out)?;
+    let mut named = request.holdout.iter().chain(&request.fit);
+    let path = &named.find(|named| named.name == picture.recording)?.path;
     let joints = &request.cell.facts.joint_names;
-    let commands = match Series::of_commands(path, topic, joints) {
-        Ok(commands) if commands.stamp_ns.is_empty() => return None,
-        Ok(commands) => commands,
-        Err(error) => return Some(Err(error.to_string())),
-    };
-    let times_s = &picture.joints.first()?.time_s;
-    let (mut from, mut row, mut rows) = (0, vec![0.0; joints.len()], Vec::new());
-    for time_s in times_s {
+    let simulated = Series::of_commands(path, topic, joints)
+        .map_err(|error| error.to_string())
+        .and_then(|commands| {
+            let rows = commands_of(&commands, picture, joints.len());
+            rollout::simulated(&kept.model, &corrections, picture, &rows)
+        });
+    match simulated {
+        Ok(rollout) => {
+            outcome.report.simulated = Some(rollout.errors());
+            Some(rollout)
+        }
+        Err(why) => {
+            let note = format!("The arm was not simulated under the recorded commands: {why}.");
+            made.notes.push(note);
+            None
+        }
+    }
+}
+
+/// The commanded positions at the samples of a picture, row by row; empty if there are none.
+fn commands_of(commands: &Series, picture: &RecordingPicture, joints: usize) -> Vec<f64> {
+    let (mut from, mut row, mut rows) = (0, vec![0.0; joints], Vec::new());
+    let times_s = picture.joints.first().map(|joint| &joint.time_s);
+    let is_commanded = !commands.stamp_ns.is_empty();
+    for time_s in times_s.into_iter().flatten().filter(|_| is_commanded) {
         let stamp_ns = picture.start_ns + (time_s * 1e9).round() as i64;
         commands.at(stamp_ns, &mut from, &mut row);
         rows.extend_from_slice(&row);
     }
-    Some(rollout::simulated(
-        &kept.model,
-        &corrections,
-        picture,
-        &rows,
-    ))
+    rows
 }
 
 /// Returns the absolute path of a result, for a pipeline file in any folder: its relative paths start at that folder.

@@ -295,7 +295,7 @@ mod tests {
         let mut tilt = at_joint("base_tilt", 0);
         tilt.place.link = 0;
         all.push(tilt);
-        let mut given = variants::all(&problem, &fit, &all, &state.efforts);
+        let mut given = tangents::all(&problem, &fit, &all, &state.efforts);
         given.retain(|given| given.variant.curve.is_none());
         // A delay has an effort without any factor.
         let delay = at_joint("torque_delay", 0);

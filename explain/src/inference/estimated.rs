@@ -9,7 +9,7 @@ use crate::physics::active::{Active, Hypothesis};
 use super::objective::{Objective, Set};
 use super::state::State;
 use super::step::refined;
-use super::{nuisance, sharpen, tangents, variants};
+use super::{nuisance, sharpen, tangents};
 
 /// Effects with their most probable numbers.
 pub struct Estimated {
@@ -35,7 +35,7 @@ pub fn estimated(
     loop {
         let sizes = state.sizes(&fit);
         let nuisances = nuisance::of(problem, &fit, &sizes, bodies, state.scales);
-        let all = variants::all(problem, &fit, optional, &state.efforts);
+        let all = tangents::all(problem, &fit, optional, &state.efforts);
         let measured = tangents::measured(problem, &fit);
         state.estimate_noise(&fit, &nuisances, &all, &measured, round == 0);
         let space = state.space(&nuisances);

@@ -313,7 +313,7 @@ mod tests {
     use crate::fixture::{at_joint, problem_with};
     use crate::inference::nuisance;
     use crate::inference::state::State;
-    use crate::inference::{tangents, variants};
+    use crate::inference::tangents;
 
     /// The gain by viscous friction that is measured as `share` of its usual size, whatever the noise is.
     fn gain(share: f64) -> f64 {
@@ -323,7 +323,7 @@ mod tests {
         let sizes = state.sizes(&fit);
         let nuisances = nuisance::of(&problem, &fit, &sizes, true, state.scales);
         let friction = [at_joint("viscous_friction", 0)];
-        let mut given = variants::all(&problem, &fit, &friction, &state.efforts);
+        let mut given = tangents::all(&problem, &fit, &friction, &state.efforts);
         given.truncate(1);
         let measured = tangents::measured(&problem, &fit);
         state.estimate_noise(&fit, &nuisances, &given, &measured, true);

@@ -6,12 +6,24 @@ use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::fit::jacobian::step_of;
-use crate::physics::active::{Active, TimeKind};
+use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::propose::grid::shapes;
 
 use super::curves::Curve;
 use super::prior::{self, Magnitude};
-use super::variants::{Given, given};
+use super::variants::{Given, given, of_hypotheses};
+
+/// The effects of `fit` as they are, and behind them every hypothesis next to it; see [`of_hypotheses`].
+pub fn all(
+    problem: &Problem,
+    fit: &Fit,
+    hypotheses: &[Hypothesis],
+    sizes: &[Magnitude],
+) -> Vec<Given> {
+    let mut all = of_fit(problem, fit, sizes);
+    all.extend(of_hypotheses(problem, fit, hypotheses, sizes));
+    all
+}
 
 /// The effects of a fit as they are, one each, in their order.
 pub fn of_fit(problem: &Problem, fit: &Fit, sizes: &[Magnitude]) -> Vec<Given> {
@@ -123,7 +135,7 @@ mod tests {
 
     use super::*;
     use crate::fixture::{at_joint, model, problem, problem_with, recording};
-    use crate::physics::active::{Hypothesis, Whereabouts};
+    use crate::physics::active::Whereabouts;
 
     /// Guards against an inertia that did not follow a moved centre of mass, so that an unknown body fitted better.
     #[test]

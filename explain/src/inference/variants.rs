@@ -15,7 +15,6 @@ use crate::propose::{times, wall};
 
 use super::curves::{self, Curve};
 use super::prior::{self, Magnitude};
-use super::tangents;
 
 /// Effort below which a column is silent, as a share of the joint's. Resolution: of the rounding of efforts.
 pub const SILENT: f64 = 1e-9;
@@ -169,15 +168,13 @@ pub fn simplest(hypothesis: Hypothesis) -> &'static str {
         .map_or(effect.name, |simpler| simpler.effect.name)
 }
 
-/// Every hypothesis at every shape of its grid, and at its most promising times; the effects of `fit` come first, as they
-/// are. The columns are tangents at `fit`.
-pub fn all(
+/// Every hypothesis at every shape of its grid, and at its most promising times. The columns are tangents at `fit`.
+pub fn of_hypotheses(
     problem: &Problem,
     fit: &Fit,
     hypotheses: &[Hypothesis],
     sizes: &[Magnitude],
 ) -> Vec<Given> {
-    let mut all = tangents::of_fit(problem, fit, sizes);
     let of = |hypothesis: &Hypothesis| -> Vec<Given> {
         if *hypothesis.effect == UNKNOWN {
             return of_curves(problem, fit, hypothesis.place.joint, sizes);
@@ -197,8 +194,10 @@ pub fn all(
             .map(|shape| at(problem, fit, *hypothesis, shape, count, sizes));
         given.flatten().collect()
     };
-    all.extend(parallel::map(hypotheses, of).into_iter().flatten());
-    all
+    parallel::map(hypotheses, of)
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// The curves that are tried at a joint.
