@@ -94,7 +94,7 @@ fn derivative(time_s: &[f64], rows: &[f64], n: usize) -> Vec<f64> {
     (0..rows.len()).map(of).collect()
 }
 
-/// What a joint and its controller did, a number a sample.
+/// Recorded motion and effort of a joint; each slice has one number per sample.
 #[derive(Debug, Clone)]
 pub struct Observed<'a> {
     /// Time \[s\].
