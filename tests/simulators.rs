@@ -10,7 +10,7 @@ fn a_written_model_moves_as_the_recorded_arm_and_needs_its_efforts_in_three_simu
     let packages: Vec<&str> = include_str!("simulators/requirements.txt")
         .lines()
         .collect();
-    let modules = "mujoco, pinocchio, pydrake, mcap_ros2";
+    let modules = "mujoco, pinocchio, pydrake, mcap";
     let python = match python::python("python-simulators", &packages, modules) {
         Ok(python) => python,
         Err(why) => return skipped("simulators", &why),

@@ -47,9 +47,16 @@ pub struct Commands<'a> {
 }
 
 impl<'a> Commands<'a> {
-    /// Commands as rows of `position` at increasing times, at least two.
+    /// Commands as rows of `position` \[rad or m\], a number per joint, at increasing times \[s\].
+    ///
+    /// # Panics
+    /// If there are fewer than two times, or `position` has another number of rows.
     pub fn new(model: &Model, time_s: &'a [f64], position: &'a [f64]) -> Self {
         let n = model.dof();
+        assert!(
+            time_s.len() > 1 && position.len() == n * time_s.len(),
+            "a row of positions at each of two times or more"
+        );
         let velocity = derivative(time_s, position, n);
         let acceleration = derivative(time_s, &velocity, n);
         let mut data = Data::new(model);
