@@ -20,20 +20,38 @@ pub trait Shelf: Sync {
     ///
     /// # Errors
     /// If it cannot be created.
-    fn begin(&self, name: &str) -> io::Result<(PathBuf, File)>;
+    fn begin(&self, name: &str) -> io::Result<(Part, File)>;
 
     /// Moves the finished `part` to `name`, unless that file exists, and removes `part`. Returns whether it was
     /// moved.
     ///
     /// # Errors
     /// If it cannot be moved.
-    fn place(&self, part: &Path, name: &str) -> io::Result<bool>;
+    fn place(&self, part: Part, name: &str) -> io::Result<bool>;
 
     /// Writes a small text file and replaces an existing one.
     ///
     /// # Errors
     /// If it cannot be written.
     fn put(&self, name: &str, text: &str) -> io::Result<()>;
+}
+
+/// An unfinished file. Its lock is held while this value lives, also after its writer has closed it: other runners
+/// take an unlocked file for that of a crashed one and remove it.
+#[derive(Debug)]
+pub struct Part {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl Part {
+    /// Removes the file.
+    ///
+    /// # Errors
+    /// If it cannot be removed.
+    pub fn discard(self) -> io::Result<()> {
+        whole_file::discard(&self.path)
+    }
 }
 
 /// Counter that makes the names of a process's unfinished files unique.
@@ -84,7 +102,7 @@ impl Shelf for Folder {
         self.root.join(name).try_exists()
     }
 
-    fn begin(&self, name: &str) -> io::Result<(PathBuf, File)> {
+    fn begin(&self, name: &str) -> io::Result<(Part, File)> {
         let file_name = Path::new(name).file_name().unwrap_or_default();
         let file_name = file_name.to_string_lossy();
         let new = OpenOptions::new()
@@ -95,25 +113,30 @@ impl Shelf for Folder {
         loop {
             let number = NUMBER.fetch_add(1, Ordering::Relaxed);
             let name = format!("{file_name}.{}.{number}.part", self.runner);
-            let part = self.unfinished.join(name);
-            let file = whole_file::create(&part, &new)?;
+            let path = self.unfinished.join(name);
+            let file = whole_file::create(&path, &new)?;
             whole_file::hold(&file)?;
+            // A duplicate of the descriptor shares the lock, which ends with the last of them (flock(2)).
+            let part = Part {
+                path,
+                _lock: file.try_clone()?,
+            };
             if file.metadata()?.nlink() > 0 {
                 return Ok((part, file));
             }
             // A starting runner removed the file before it was locked, as if its owner had crashed.
-            let _ = whole_file::discard(&part);
+            let _ = part.discard();
         }
     }
 
-    fn place(&self, part: &Path, name: &str) -> io::Result<bool> {
+    fn place(&self, part: Part, name: &str) -> io::Result<bool> {
         let path = self.root.join(name);
         if let Some(folder) = path.parent() {
             whole_file::create_folder(folder)?;
         }
-        match whole_file::put_in_place(part, &path, Existing::Keep) {
+        match whole_file::put_in_place(&part.path, &path, Existing::Keep) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-                whole_file::discard(part)?;
+                part.discard()?;
                 Ok(false)
             }
             placed => placed.map(|()| true),
@@ -128,7 +151,7 @@ impl Shelf for Folder {
         if let Some(folder) = path.parent() {
             whole_file::create_folder(folder)?;
         }
-        whole_file::put_in_place(&part, &path, Existing::Replace)
+        whole_file::put_in_place(&part.path, &path, Existing::Replace)
     }
 }
 
@@ -144,15 +167,12 @@ mod tests {
             Folder::open(folder.path()).unwrap(),
         );
         let name = "cell=c/day=d/k.parquet";
-        let parts: Vec<_> = ([&one, &two].iter())
-            .map(|shelf| shelf.begin(name).unwrap())
-            .collect();
-        for (n, (part, _)) in parts.iter().enumerate() {
-            fs::write(part, n.to_string()).unwrap();
-        }
+        let [first, second] = [&one, &two].map(|shelf| shelf.begin(name).unwrap().0);
+        fs::write(&first.path, "0").unwrap();
+        fs::write(&second.path, "1").unwrap();
         assert!(!one.holds(name).unwrap());
-        assert!(two.place(&parts[1].0, name).unwrap());
-        assert!(!one.place(&parts[0].0, name).unwrap());
+        assert!(two.place(second, name).unwrap());
+        assert!(!one.place(first, name).unwrap());
         assert!(one.holds(name).unwrap());
         assert_eq!(fs::read_to_string(folder.path().join(name)).unwrap(), "1");
         assert_eq!(fs::read_dir(&one.unfinished).unwrap().count(), 0);
@@ -171,7 +191,7 @@ mod tests {
             });
             let results = (0..20_000).map(|_| {
                 let (part, _file) = working.begin("a.parquet")?;
-                fs::remove_file(&part)
+                part.discard()
             });
             let results = results.collect();
             done.store(true, Ordering::Relaxed);
@@ -186,12 +206,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let living = Folder::open(folder.path()).unwrap();
         let (part, file) = living.begin("a.parquet").unwrap();
+        let path = part.path.clone();
         let dead = living.unfinished.join("b.parquet.0.part");
         fs::write(&dead, "half").unwrap();
         Folder::open(folder.path()).unwrap();
-        assert!(part.exists() && !dead.exists());
+        assert!(path.exists() && !dead.exists());
+        // The writer of a result closes its file before the runner moves it.
         drop(file);
         Folder::open(folder.path()).unwrap();
-        assert!(!part.exists());
+        assert!(path.exists());
+        drop(part);
+        Folder::open(folder.path()).unwrap();
+        assert!(!path.exists());
     }
 }

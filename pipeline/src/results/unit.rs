@@ -80,11 +80,11 @@ impl Unit<'_> {
             Ok(outcome) => outcome,
             Err(error) => {
                 // The caller receives the original error, not one of the cleanup.
-                let _ = tauscope_archive::whole_file::discard(&part);
+                let _ = part.discard();
                 return Err(error);
             }
         };
-        let placed = self.shelf.place(&part, &name).map_err(UnitError::Place)?;
+        let placed = self.shelf.place(part, &name).map_err(UnitError::Place)?;
         let lost = outcome.lost;
         Ok(if placed {
             Done::Now { lost }
