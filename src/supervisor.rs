@@ -7,9 +7,8 @@
 //! their files; a third one ends these, too. A stage that does not end is reported and then killed. Nothing outlives
 //! the supervisor: a stage ends when its standard input closes, and Linux kills it when its parent dies.
 //!
-//! A stage that receives nothing usable is reported within seconds, with what is received instead ([`watchman`]).
+//! A stage that receives nothing usable is reported within seconds, with what is received instead ([`watchdog`]).
 
-mod crew;
 mod exit_words;
 mod flow;
 mod ledger;
@@ -27,7 +26,8 @@ mod silence;
 mod summary;
 mod tally;
 mod view;
-mod watchman;
+mod watchdog;
+mod worker;
 
 use std::time::Duration;
 
@@ -39,7 +39,6 @@ use tokio::time::Instant;
 
 use crate::announce;
 use crate::plan::{Link, Over};
-use crew::Crew;
 use local::Local;
 use process::Event;
 use reported::Reported;
@@ -50,6 +49,7 @@ pub use summary::{Ended, Summary};
 use tauscope_pipeline::pipeline::{Pipeline, Role};
 pub use view::Verbosity;
 use view::View;
+use worker::Worker;
 
 /// Time for a stage to finish by itself after all of its inputs have ended; then the supervisor asks it to end.
 const GRACE: Duration = Duration::from_secs(2);
@@ -122,11 +122,11 @@ async fn supervise(
     };
     let (sender, events) = mpsc::channel(EVENTS);
     let now = Instant::now();
-    let (stages, crews) = lives::crews(pipeline, links, seats);
+    let (stages, workers) = lives::workers(pipeline, links, seats);
     let mut supervisor = Supervisor {
         pipeline,
         stages,
-        crews,
+        workers,
         shared_memory,
         sender,
         stopping: false,
@@ -154,7 +154,7 @@ async fn supervise(
 struct Supervisor<'a> {
     pipeline: &'a Pipeline,
     stages: Vec<Local>,
-    crews: Vec<Crew>,
+    workers: Vec<Worker>,
     shared_memory: Option<SharedMemory>,
     sender: mpsc::Sender<(Mark, Event)>,
     stopping: bool,
@@ -188,30 +188,30 @@ impl Supervisor<'_> {
                 () = tokio::time::sleep_until(alarm) => self.alarm(),
                 now = look.tick() => self.look(now),
             }
-            self.close_crews();
+            self.close_workers();
         }
     }
 
-    fn take(&mut self, (crew, life): Mark, event: Event) {
+    fn take(&mut self, (worker, life): Mark, event: Event) {
         // The exit is the last event of an incarnation, so none of an earlier one can follow.
-        debug_assert_eq!(self.crews[crew].life, life, "an event of another life");
+        debug_assert_eq!(self.workers[worker].life, life, "an event of another life");
         match event {
             Event::Said(line) => self
                 .view
-                .warn(&format!("[{}] {line}", self.crews[crew].name)),
-            Event::Reported(line) => self.hear(crew, &line),
+                .warn(&format!("[{}] {line}", self.workers[worker].name)),
+            Event::Reported(line) => self.hear(worker, &line),
             Event::Exited(status) => {
-                self.crews[crew].exited();
-                self.process_ended(crew, &status);
+                self.workers[worker].exited();
+                self.process_ended(worker, &status);
                 self.settle();
             }
         }
     }
 
     /// Handles a line of a process's standard output.
-    fn hear(&mut self, crew: usize, line: &str) {
-        let Some(index) = self.speaker(crew, line) else {
-            let name = &self.crews[crew].name;
+    fn hear(&mut self, worker: usize, line: &str) {
+        let Some(index) = self.speaker(worker, line) else {
+            let name = &self.workers[worker].name;
             self.view.note(&format!("[{name}] {line}"));
             return;
         };
@@ -219,8 +219,8 @@ impl Supervisor<'_> {
         match stage.report(line) {
             Reported::Counts => {
                 let root = stage.root;
-                if stage.is_done() && !self.crews[crew].outside {
-                    self.tree_ended(root);
+                if stage.is_done() && !self.workers[worker].outside {
+                    self.group_ended(root);
                 }
             }
             // The watchdog reads these states at its next poll.
@@ -279,15 +279,19 @@ impl Supervisor<'_> {
     /// leave a `.part`. A second call kills these, too.
     fn end_at_once(&mut self) {
         let spares = !std::mem::replace(&mut self.hurried, true);
-        let records = |crew: &Crew| crew.stages.iter().any(|&index| self.is_recorder(index));
-        let spared: Vec<bool> = self.crews.iter().map(|it| spares && records(it)).collect();
+        let records = |worker: &Worker| worker.stages.iter().any(|&index| self.is_recorder(index));
+        let spared: Vec<bool> = self
+            .workers
+            .iter()
+            .map(|it| spares && records(it))
+            .collect();
         self.view.note(if spared.contains(&true) {
             "ending everything at once; recorders complete their files (again to end them, too)"
         } else {
             "ending everything at once"
         });
-        for (crew, is_spared) in spared.into_iter().enumerate() {
-            for index in self.crews[crew].stages.clone() {
+        for (worker, is_spared) in spared.into_iter().enumerate() {
+            for index in self.workers[worker].stages.clone() {
                 if is_spared {
                     let recorder = self.is_recorder(index);
                     self.ask_to_end(index, recorder);
@@ -296,7 +300,7 @@ impl Supervisor<'_> {
                 }
             }
             if !is_spared {
-                self.crews[crew].kill();
+                self.workers[worker].kill();
             }
         }
     }
@@ -348,7 +352,7 @@ impl Supervisor<'_> {
             let root = self.stages[index].root;
             if let Err(error) = self.start(root) {
                 self.view.warn(&format!("error: {error:#}"));
-                for index in self.tree(root) {
+                for index in self.group(root) {
                     self.stages[index].give_up();
                 }
                 self.stop();

@@ -8,6 +8,8 @@
 //! - After a restart of either peer the stream continues.
 //! - The end of the stream is delivered to every receiver.
 
+use std::os::fd::BorrowedFd;
+use std::task::{Poll, Waker};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
@@ -38,6 +40,10 @@ pub use zenoh::{Zenoh, ZenohEndpoints, ZenohRouter, zenoh_reason};
 /// Chosen: a busy disk or scheduler stops a receiver for a second or two; a longer wait only holds up all other
 /// receivers.
 pub const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Interval at which a sender is asked whether its stream has been taken.
+/// Resolution: delay of the end of a stage.
+pub(crate) const POLL_TAKEN_EVERY: Duration = Duration::from_millis(1);
 
 /// Largest number of unread samples of a receiver.
 /// Resolution: memory.
@@ -247,15 +253,29 @@ pub trait Sender<T: Sample>: Send {
     /// [`LinkError::Send`] if the transport fails.
     fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError>;
 
-    /// Waits, after [`Sender::end`], until every connected receiver has taken the end and so all samples before it.
-    /// Returns the number of receivers that have not. A process that exits earlier may lose unread samples.
+    /// Ready after [`Sender::end`] once every connected receiver has taken the end and so all samples before it, or
+    /// when the wait is over. Returns the number of receivers that have not. A process that exits earlier may lose
+    /// unread samples.
     ///
     /// The wait ends `timeout` after the end or after the last progress that the transport knows of, whichever is
     /// later, as the user timeout of TCP (RFC 5482): a slow receiver is no reason to give up.
     ///
     /// # Errors
     /// See [`Sender::send_with`].
-    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError>;
+    fn poll_taken(&mut self, timeout: Duration) -> Result<Poll<usize>, LinkError>;
+
+    /// Waits until [`Sender::poll_taken`] is ready.
+    ///
+    /// # Errors
+    /// See [`Sender::send_with`].
+    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+        loop {
+            if let Poll::Ready(missing) = self.poll_taken(timeout)? {
+                return Ok(missing);
+            }
+            std::thread::sleep(POLL_TAKEN_EVERY);
+        }
+    }
 
     /// The counters.
     fn counts(&self) -> SenderCounts;
@@ -272,6 +292,16 @@ pub trait Receiver<T: Sample>: Send {
         timeout: Duration,
         read: &mut dyn FnMut(&T),
     ) -> Result<Received, LinkError>;
+
+    /// Announces new samples to an event loop, which then calls [`Receiver::receive`] without a timeout: wakes
+    /// `waker`, unless there is a [`Receiver::descriptor`] or the result is an interval at which the receiver is to be
+    /// polled; zero for busy polling.
+    fn register(&mut self, waker: &Waker) -> Option<Duration>;
+
+    /// Descriptor that is readable when there are samples.
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
 
     /// The counters.
     fn counts(&self) -> ReceiverCounts;
@@ -297,8 +327,8 @@ impl<T: Sample, S: Sender<T> + ?Sized> Sender<T> for Box<S> {
     fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {
         (**self).wait_for_receivers(timeout)
     }
-    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        (**self).wait_until_taken(timeout)
+    fn poll_taken(&mut self, timeout: Duration) -> Result<Poll<usize>, LinkError> {
+        (**self).poll_taken(timeout)
     }
     fn counts(&self) -> SenderCounts {
         (**self).counts()
@@ -318,8 +348,8 @@ impl<T: Sample, S: Sender<T> + ?Sized> Sender<T> for &mut S {
     fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {
         (**self).wait_for_receivers(timeout)
     }
-    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        (**self).wait_until_taken(timeout)
+    fn poll_taken(&mut self, timeout: Duration) -> Result<Poll<usize>, LinkError> {
+        (**self).poll_taken(timeout)
     }
     fn counts(&self) -> SenderCounts {
         (**self).counts()
@@ -333,6 +363,12 @@ impl<T: Sample, R: Receiver<T> + ?Sized> Receiver<T> for &mut R {
         read: &mut dyn FnMut(&T),
     ) -> Result<Received, LinkError> {
         (**self).receive(timeout, read)
+    }
+    fn register(&mut self, waker: &Waker) -> Option<Duration> {
+        (**self).register(waker)
+    }
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        (**self).descriptor()
     }
     fn counts(&self) -> ReceiverCounts {
         (**self).counts()

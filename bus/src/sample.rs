@@ -278,6 +278,8 @@ pub trait Sample: Pod + Default + std::fmt::Debug + Send + Sync + ZeroCopySend +
     fn header_mut(&mut self) -> &mut Header;
     /// The sample as a value whose type is known at run time only.
     fn as_ref(&self) -> SampleRef<'_>;
+    /// The sample of this type; `None` for one of another type.
+    fn of(sample: SampleRef<'_>) -> Option<&Self>;
     /// Checks that no value can make a stage panic or corrupt its state. In an end mark only the header is checked.
     ///
     /// # Errors
@@ -345,6 +347,12 @@ macro_rules! samples {
             }
             fn as_ref(&self) -> SampleRef<'_> {
                 SampleRef::$name(self)
+            }
+            fn of(sample: SampleRef<'_>) -> Option<&Self> {
+                match sample {
+                    SampleRef::$name(sample) => Some(sample),
+                    _ => None,
+                }
             }
             fn check(&self) -> Result<(), Unsound> {
                 self.header.check()?;

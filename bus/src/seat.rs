@@ -17,7 +17,7 @@ use crate::sample::SampleKind;
 
 mod links;
 
-pub use links::{AnyReceiver, Links, Transports};
+pub use links::{AnyReceiver, AnySender, Links, Transports};
 
 /// The assignment of one stage of a pipeline to a process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -100,6 +100,13 @@ impl Seat {
         Duration::from_millis(self.start_within_ms)
     }
 
+    /// Whether the stage waits while a receiver that must lose nothing is slow. Health reports are so rare that their
+    /// link always has room.
+    pub(crate) fn may_wait(&self) -> bool {
+        let mut links = self.output.iter().flat_map(|output| &output.links);
+        links.any(|link| link.audience.keep_all > 0 && link.spill.is_none_or(|spill| spill.waits))
+    }
+
     /// Stall timeout.
     pub fn patience(&self) -> Duration {
         Duration::from_millis(self.patience_ms)
@@ -122,7 +129,7 @@ pub struct Cell {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TransportKind {
-    /// Calls within one stage group ([`Tree`](crate::shell::Tree)), which pass each sample in place.
+    /// Calls within one stage group ([`Group`](crate::shell::Group)), which pass each sample in place.
     InProcess,
     /// Shared memory, within a host.
     Iceoryx2,
@@ -153,19 +160,6 @@ pub struct Input {
     /// Position of an earlier incarnation of this stage, so that samples lost in its crash are counted.
     #[serde(default)]
     pub resume: Option<Position>,
-}
-
-impl Input {
-    /// Polling interval, if no notification wakes the receiver.
-    pub(crate) fn looks(&self) -> Option<Duration> {
-        let is_woken = match self.wake {
-            Wake::EveryMs(_) => false,
-            Wake::EveryMsOrUrgent(_) => self.kind.may_alarm(),
-            Wake::Event | Wake::Spin => true,
-        };
-        let looks = self.transport == TransportKind::Iceoryx2 && !is_woken;
-        self.wake.pause().filter(|_| looks)
-    }
 }
 
 /// A stream that a stage emits.

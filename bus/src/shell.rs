@@ -1,10 +1,8 @@
-//! Shells: the run loops around a source, a stage or a sink. They feed it, count samples, report its health and pass
-//! on the end of the stream.
+//! Execution of stages: stage groups, the event loops that run them, and the processes with these loops.
 //!
-//! - [`run_source`], [`run_stage`], [`run_sink`] run one stage over open links and return a [`Report`], also after a
-//!   failure.
-//! - [`Tree`] is the run loop of a stage group: a source or a link, and all stages behind it in one thread. [`crew`]
-//!   runs any number of stage groups in one worker process.
+//! - [`Group`] connects sources, stages and sinks and processes their samples. It does not wait, so a replay runs it,
+//!   too. [`run`] runs one against the clock of the machine.
+//! - [`worker`] is a process that runs any number of groups in a few event loops.
 //! - [`child`] runs a stage in a process of its own, which reads its [`Seat`](crate::Seat) from standard
 //!   input; [`outside`] is the complete `main` of a stage from another crate.
 
@@ -13,27 +11,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 pub mod child;
-mod crew;
+mod event_loop;
+pub mod group;
 mod health;
 mod ledger;
 mod pulse;
 mod report;
-mod single;
-mod sink;
-pub mod tree;
+mod worker;
 
 pub use child::{Child, ChildError, Line, holds, note, outside};
-pub use crew::{Member, Unmade, crew};
-pub use health::HealthClock;
+pub use group::{Ends, Group, Input, Next, Node};
 pub use ledger::{Account, Ledger};
 pub use report::{Board, InputReport, Outcome, Report};
-pub use single::{run_source, run_stage};
-pub use sink::{SinkInput, run_sink};
-pub use tree::Tree;
+pub use worker::{Unmade, worker};
 
-/// Longest wait for a sample between two checks for a stop request.
-/// Resolution: delay of a stop, against the number of wake-ups.
-const TICK: Duration = Duration::from_millis(100);
 /// Longest time that a terminating stage waits, without progress, for receivers that have not read all of its stream.
 /// Resolution: duration of a shutdown.
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
@@ -80,4 +71,19 @@ impl Context {
             ..Self::default()
         }
     }
+}
+
+/// Runs nodes, each behind its inputs, to their ends in this thread.
+///
+/// # Errors
+/// If the system has no more descriptors. The failure of a stage is in its report.
+pub fn run<'a>(context: &Context, nodes: Vec<(Node<'a>, Ends)>) -> std::io::Result<Vec<Report>> {
+    let group = move |pulse| {
+        let mut group = Group::under(pulse);
+        for (node, ends) in nodes {
+            group.add(node, ends)?;
+        }
+        Ok(group)
+    };
+    event_loop::run(context, Duration::ZERO, |_, _| {}, group)
 }

@@ -4,7 +4,8 @@
 //! one stream into another, and a [`Sink`] accepts any number of streams and emits none.
 
 use std::path::PathBuf;
-use std::time::Duration;
+use std::task::Waker;
+use std::time::{Duration, Instant};
 
 use crate::link::LinkError;
 use crate::sample::{Sample, SampleRef};
@@ -46,19 +47,30 @@ impl StageError {
 pub enum Progress {
     /// More samples may follow at once.
     More,
-    /// No data now, for example a live source that waits for its peer; call again soon.
+    /// No data now, for example a live source that waits for its peer; call again once it has woken its waker
+    /// ([`Source::register`]), or soon.
     Idle,
+    /// No data before this time, for example a source that plays a recording at its own rate.
+    Until(Instant),
     /// The source has ended.
     End,
 }
 
-/// Emits a stream. The only kind of stage that may read input of its own, and block.
+/// Emits a stream. The only kind of stage that may read input of its own. It does not wait: other sources share its
+/// thread.
 pub trait Source<T: Sample>: Send {
-    /// Emits the next samples, at most a few, and returns within 0.1 s.
+    /// Emits the next samples, at most a few.
     ///
     /// # Errors
     /// If the source cannot be read any further.
     fn step(&mut self, out: &mut dyn Emit<T>) -> Result<Progress, StageError>;
+
+    /// Stores the waker of the thread that calls [`Source::step`]. A source that receives data in a thread of its own
+    /// wakes it for new data; without that, a step follows a millisecond after one that was [`Progress::Idle`].
+    /// Returns whether the source will do so.
+    fn register(&mut self, _waker: &Waker) -> bool {
+        false
+    }
 
     /// Number of samples dropped so far (NaN, unreadable) or lost on the way to this source.
     fn dropped(&self) -> u64 {
@@ -71,7 +83,7 @@ pub trait Source<T: Sample>: Send {
     }
 
     /// Reason why no usable data arrives, `silent_for` after the last sample (or the start); `None` while data
-    /// arrives. Called twice a second; must return within 0.1 s.
+    /// arrives. Called ten times a second.
     fn trouble(&mut self, _silent_for: Duration) -> Option<Trouble> {
         None
     }
@@ -80,6 +92,10 @@ pub trait Source<T: Sample>: Send {
 impl<T: Sample, S: Source<T> + ?Sized> Source<T> for Box<S> {
     fn step(&mut self, out: &mut dyn Emit<T>) -> Result<Progress, StageError> {
         (**self).step(out)
+    }
+
+    fn register(&mut self, waker: &Waker) -> bool {
+        (**self).register(waker)
     }
 
     fn dropped(&self) -> u64 {
@@ -98,6 +114,10 @@ impl<T: Sample, S: Source<T> + ?Sized> Source<T> for Box<S> {
 impl<T: Sample, S: Source<T> + ?Sized> Source<T> for &mut S {
     fn step(&mut self, out: &mut dyn Emit<T>) -> Result<Progress, StageError> {
         (**self).step(out)
+    }
+
+    fn register(&mut self, waker: &Waker) -> bool {
+        (**self).register(waker)
     }
 
     fn dropped(&self) -> u64 {

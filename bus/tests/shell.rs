@@ -6,12 +6,10 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use tauscope_bus::link::FanOut;
-use tauscope_bus::shell::{
-    Context, Ledger, Outcome, Report, SinkInput, run_sink, run_source, run_stage,
-};
+use tauscope_bus::seat::{AnyReceiver, AnySender};
+use tauscope_bus::shell::{self, Context, Ends, Input, Node, Outcome, Report};
 use tauscope_bus::{
-    Audience, Detection, Emit, Health, InProcess, JointState, Keep, Progress, Receiver, SampleRef,
+    Audience, Detection, Emit, Health, InProcess, JointState, Keep, Progress, Sample, SampleRef,
     Sender, Sink, Source, Stage, StageError, Transport, TwinState,
 };
 
@@ -99,8 +97,19 @@ impl Sink for Keeper {
     }
 }
 
-fn nowhere() -> FanOut<Health> {
-    FanOut::new(Vec::new())
+/// Runs a group of one node.
+fn run(context: &Context, node: Node<'_>, ends: Ends) -> Report {
+    let mut reports = shell::run(context, vec![(node, ends)]).unwrap();
+    reports.pop().unwrap()
+}
+
+/// An input that receives from a link.
+fn input<T: Sample>(links: &InProcess, from: &str, stream: &str) -> Input {
+    let receiver = links.receiver::<T>(stream, Keep::All, 16).unwrap();
+    Input::Link {
+        from: from.to_owned(),
+        open: Box::new(move || Ok(Box::new(receiver) as Box<dyn AnyReceiver>)),
+    }
 }
 
 struct Chain {
@@ -115,68 +124,38 @@ fn run_chain(length: i64, stop_after: Option<Duration>) -> Chain {
     let links = InProcess::new();
     let both = Audience::of(Keep::All, 2);
     let one = Audience::of(Keep::All, 1);
-    let mut states: Box<dyn Sender<JointState>> = links.sender("c/count", both).unwrap();
-    let mut twins: Box<dyn Sender<TwinState>> = links.sender("c/delay", one).unwrap();
-    let mut health: Box<dyn Sender<Health>> = links.sender("c/delay/health", one).unwrap();
-    let mut input: Box<dyn Receiver<JointState>> =
-        links.receiver("c/count", Keep::All, 16).unwrap();
+    let states = links.sender::<JointState>("c/count", both).unwrap();
+    let twins = links.sender::<TwinState>("c/delay", one).unwrap();
+    let health: Box<dyn Sender<Health>> = links.sender("c/delay/health", one).unwrap();
+    let states_in = input::<JointState>(&links, "count", "c/count");
     let inputs = vec![
-        SinkInput {
-            from: "count".to_owned(),
-            receiver: Box::new(
-                links
-                    .receiver::<JointState>("c/count", Keep::All, 16)
-                    .unwrap(),
-            ),
-            looks: None,
-        },
-        SinkInput {
-            from: "delay".to_owned(),
-            receiver: Box::new(
-                links
-                    .receiver::<TwinState>("c/delay", Keep::All, 16)
-                    .unwrap(),
-            ),
-            looks: Some(Duration::from_millis(5)),
-        },
-        SinkInput {
-            from: "delay".to_owned(),
-            receiver: Box::new(
-                links
-                    .receiver::<Health>("c/delay/health", Keep::All, 16)
-                    .unwrap(),
-            ),
-            looks: None,
-        },
+        input::<JointState>(&links, "count", "c/count"),
+        input::<TwinState>(&links, "delay", "c/delay"),
+        input::<Health>(&links, "delay", "c/delay/health"),
     ];
     let seen = Arc::new(Mutex::new(Seen::default()));
     let source_context = Context::new("count");
     let (source, stage, sink) = std::thread::scope(|scope| {
         let source = scope.spawn(|| {
-            let mut source = Counter { next: 0, length };
-            run_source(&source_context, &mut source, &mut *states, &mut nowhere())
+            let ends = Ends {
+                output: Some(AnySender::new(states)),
+                ..Ends::new("count", vec![])
+            };
+            let source = Node::source(Box::new(Counter { next: 0, length }));
+            run(&source_context, source, ends)
         });
-        let stage = scope.spawn(|| {
-            let context = Context::new("delay");
-            let mut stage = Delay::default();
-            run_stage(
-                &context,
-                &mut stage,
-                "count",
-                &mut *input,
-                &mut *twins,
-                &mut *health,
-            )
+        let stage = scope.spawn(move || {
+            let ends = Ends {
+                output: Some(AnySender::new(twins)),
+                health: Some(health),
+                ..Ends::new("delay", vec![states_in])
+            };
+            let stage = Node::stage(Box::new(Delay::default()));
+            run(&Context::new("delay"), stage, ends)
         });
         let sink = scope.spawn(|| {
-            let context = Context::new("keep");
-            run_sink(
-                &context,
-                &mut Keeper(Arc::clone(&seen)),
-                inputs,
-                &mut nowhere(),
-                &Ledger::default(),
-            )
+            let sink = Node::sink(Box::new(Keeper(Arc::clone(&seen))));
+            run(&Context::new("keep"), sink, Ends::new("keep", inputs))
         });
         if let Some(time) = stop_after {
             std::thread::sleep(time);
@@ -258,9 +237,8 @@ fn a_stage_that_fails_says_why_and_ends_no_stream() {
     let links = InProcess::new();
     let one = Audience::of(Keep::All, 1);
     let mut states: Box<dyn Sender<JointState>> = links.sender("c/count", one).unwrap();
-    let mut input: Box<dyn Receiver<JointState>> =
-        links.receiver("c/count", Keep::All, 16).unwrap();
-    let mut twins: Box<dyn Sender<TwinState>> = links.sender("c/delay", one).unwrap();
+    let states_in = input::<JointState>(&links, "count", "c/count");
+    let twins = links.sender::<TwinState>("c/delay", one).unwrap();
     let mut output = links
         .receiver::<TwinState>("c/delay", Keep::All, 16)
         .unwrap();
@@ -269,19 +247,16 @@ fn a_stage_that_fails_says_why_and_ends_no_stream() {
             .send_with(&mut |sample| sample.header.stamp_ns = stamp)
             .unwrap();
     }
-    let mut stage = Delay {
+    let stage = Delay {
         fail_at: Some(3),
         ..Delay::default()
     };
     let context = Context::new("delay");
-    let report = run_stage(
-        &context,
-        &mut stage,
-        "count",
-        &mut *input,
-        &mut *twins,
-        &mut nowhere(),
-    );
+    let ends = Ends {
+        output: Some(AnySender::new(twins)),
+        ..Ends::new("delay", vec![states_in])
+    };
+    let report = run(&context, Node::stage(Box::new(stage)), ends);
     assert_eq!(
         report.outcome,
         Some(Outcome::Failed("it is broken".to_owned()))
@@ -300,26 +275,13 @@ fn a_sink_that_is_stopped_deals_with_what_has_arrived_and_flushes_while_idle() {
     let mut detections: Box<dyn Sender<Detection>> = links
         .sender("c/detect", Audience::of(Keep::All, 1))
         .unwrap();
-    let inputs = vec![SinkInput {
-        from: "detect".to_owned(),
-        receiver: Box::new(
-            links
-                .receiver::<Detection>("c/detect", Keep::All, 16)
-                .unwrap(),
-        ),
-        looks: None,
-    }];
+    let inputs = vec![input::<Detection>(&links, "detect", "c/detect")];
     let seen = Arc::new(Mutex::new(Seen::default()));
     let context = Context::new("keep");
     let report = std::thread::scope(|scope| {
         let sink = scope.spawn(|| {
-            run_sink(
-                &context,
-                &mut Keeper(Arc::clone(&seen)),
-                inputs,
-                &mut nowhere(),
-                &Ledger::default(),
-            )
+            let sink = Node::sink(Box::new(Keeper(Arc::clone(&seen))));
+            run(&context, sink, Ends::new("keep", inputs))
         });
         while seen.lock().unwrap().idle == 0 {
             std::thread::sleep(Duration::from_millis(1));

@@ -5,8 +5,8 @@
 
 use std::time::Duration;
 
-use tauscope_bus::link::FanOut;
-use tauscope_bus::shell::{Context, run_stage};
+use tauscope_bus::seat::{AnyReceiver, AnySender};
+use tauscope_bus::shell::{self, Context, Ends, Input, Node};
 use tauscope_bus::{
     Audience, Domain, Emit, InProcess, JointState, Keep, Received, Receiver, Sender, SharedMemory,
     Stage, StageError, Transport, TwinState,
@@ -78,7 +78,7 @@ fn place_in_segment(sample: &TwinState) -> Place {
 fn run(transport: &impl Transport, place_of: fn(&TwinState) -> Place) -> (Vec<Place>, Vec<Place>) {
     let before = InProcess::new();
     let one = Audience::of(Keep::All, 1);
-    let mut input: Box<dyn Receiver<JointState>> = before.receiver("in", Keep::All, 8).unwrap();
+    let input: Box<dyn Receiver<JointState>> = before.receiver("in", Keep::All, 8).unwrap();
     let mut states: Box<dyn Sender<JointState>> = before.sender("in", one).unwrap();
     for number in 1..=3_u8 {
         let fill = &mut |state: &mut JointState| {
@@ -89,7 +89,7 @@ fn run(transport: &impl Transport, place_of: fn(&TwinState) -> Place) -> (Vec<Pl
     }
     states.end().unwrap();
 
-    let mut output = transport.sender("out", one).unwrap();
+    let mut output = transport.sender::<TwinState>("out", one).unwrap();
     let mut reader: Box<dyn Receiver<TwinState>> = transport.receiver("out", Keep::All, 8).unwrap();
     assert_eq!(output.wait_for_receivers(LONG).unwrap(), 0);
     let places = std::thread::scope(|scope| {
@@ -99,23 +99,23 @@ fn run(transport: &impl Transport, place_of: fn(&TwinState) -> Place) -> (Vec<Pl
                 assert!((twin.residual[0] - twin.header.stamp_ns as f64).abs() < 1e-9);
                 saw.push(place_of(twin));
             };
-            while reader.receive(LONG, &mut read).unwrap() == Received::Sample {}
+            while (*reader).receive(LONG, &mut read).unwrap() == Received::Sample {}
             saw
         });
         let mut twin = Twin {
             place_of: Some(place_of),
             ..Twin::default()
         };
-        let context = Context::new("twin");
-        let mut health = FanOut::new(Vec::new());
-        run_stage(
-            &context,
-            &mut twin,
-            "in",
-            &mut *input,
-            &mut *output,
-            &mut health,
-        );
+        let input = Input::Link {
+            from: "in".to_owned(),
+            open: Box::new(move || Ok(Box::new(input) as Box<dyn AnyReceiver>)),
+        };
+        let ends = Ends {
+            output: Some(AnySender::new(output)),
+            ..Ends::new("twin", vec![input])
+        };
+        let node = Node::stage(Box::new(&mut twin));
+        shell::run(&Context::new("twin"), vec![(node, ends)]).unwrap();
         (twin.wrote, saw.join().unwrap())
     });
     assert_eq!((places.0.len(), places.1.len()), (3, 3));

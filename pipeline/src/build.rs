@@ -2,6 +2,7 @@
 //! and detector to validate its settings.
 
 use std::collections::BTreeMap;
+use std::task::Waker;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
@@ -143,6 +144,10 @@ impl Source<JointState> for After {
             out,
             after_ns: self.after_ns,
         })
+    }
+
+    fn register(&mut self, waker: &Waker) -> bool {
+        self.inner.register(waker)
     }
 
     fn dropped(&self) -> u64 {

@@ -8,7 +8,8 @@ mod spread;
 
 use std::path::{Path, PathBuf};
 
-use tauscope_bus::{JointState, TwinState};
+use tauscope_bus::TwinState;
+use tauscope_bus::shell::{Ends, Group, Input, Node};
 use tauscope_dynamics::effort_scale::{EffortScale, ScaleFault};
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
 use tauscope_session::{Effect, Finding, by_recording};
@@ -18,10 +19,9 @@ use tauscope_twin::{
 
 use crate::build;
 use crate::cell::{Cell, EffortUnit};
-use crate::graph::Graph;
 use crate::plausible;
 use crate::provenance;
-use crate::replay::ReplayError;
+use crate::replay::{self, ReplayError};
 use crate::report::without_path;
 use read::{Read, Settled};
 
@@ -259,13 +259,6 @@ impl Job<'_> {
             let mut source = RecordedSource::open_to_learn(&file, &config, &setup)?;
             let findings = source.findings();
             let twin = build::twin(self.twin, model, self.cell)?;
-            let mut graph = Graph::default();
-            let states = graph.source("ingest", Box::new(source));
-            let twins = graph.stage("twin", Box::new(twin), &states)?;
-            let inputs = vec![
-                graph.listen::<JointState>(&states)?,
-                graph.listen::<TwinState>(&twins)?,
-            ];
             let sink = Settled {
                 plausible: &mut plausible,
                 measured: &mut measured,
@@ -273,8 +266,14 @@ impl Job<'_> {
                 take: &mut *take,
                 reset: true,
             };
-            graph.sink("calibration", Box::new(sink), inputs);
-            let counts = graph.run(&mut |fraction| {
+            let mut group = Group::default();
+            let of = |name: &str| Input::Of(name.to_owned());
+            group.add(Node::source(Box::new(source)), Ends::new("ingest", vec![]))?;
+            let states = vec![of("ingest")];
+            group.add(Node::stage(Box::new(twin)), Ends::new("twin", states))?;
+            let both = vec![of("ingest"), of("twin")];
+            group.add(Node::sink(Box::new(sink)), Ends::new("calibration", both))?;
+            let counts = replay::run(&mut group, &mut |fraction| {
                 progress(fraction);
                 true
             })?;

@@ -8,7 +8,6 @@ pub mod build;
 pub mod calibrate;
 pub mod cell;
 pub mod files;
-pub mod graph;
 pub mod learnt_state;
 pub mod parallel;
 pub mod pipeline;

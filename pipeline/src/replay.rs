@@ -5,17 +5,18 @@ mod error;
 mod observe;
 mod open;
 mod redirect;
+mod run;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use tauscope_bus::{Detection, JointState, SampleKind, Sink, TwinState};
+use tauscope_bus::Sink;
+use tauscope_bus::shell::{Ends, Group, Input, Node};
 use tauscope_ingest::{ArchivedTwin, Commanded, Findings};
 use tauscope_twin::TwinFile;
 
 use crate::build;
 use crate::cell::Cell;
-use crate::graph::{Graph, SinkInput, StageCounts, Stream};
 use crate::pipeline::{Pipeline, Stage};
 use crate::plausible::PlausibleTwin;
 use crate::settings::Settings;
@@ -25,6 +26,8 @@ use redirect::redirect;
 
 pub use error::ReplayError;
 pub use observe::Observer;
+pub use run::StageCounts;
+pub(crate) use run::run;
 
 /// Handling of an archive that already holds a twin's effort.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
@@ -176,30 +179,29 @@ impl<'a> Replay<'a> {
         let mut observer = Observer::new(cell, self.plausible_twins());
         let mut files = Vec::new();
         let mut findings = Findings::default();
-        let mut graph = Graph::default();
-        let mut streams: BTreeMap<usize, Stream> = BTreeMap::new();
+        let mut group = Group::default();
+        // The stages whose streams are there.
+        let mut streams: BTreeSet<usize> = BTreeSet::new();
         // Detectors behind one twin process the same samples, so they can share derived values.
         let mut shared: BTreeMap<usize, tauscope_detect::Shared> = BTreeMap::new();
         for &index in &self.members {
             let stage = &self.pipeline.stages[index];
             let input = stage.inputs.first();
-            let input = input.and_then(|input| streams.get(input)).cloned();
-            let stream = match (&stage.settings, input) {
+            let input = input.copied().filter(|input| streams.contains(input));
+            let node = match (&stage.settings, input) {
                 (Settings::Ingest(config), _) => {
                     let source;
                     (source, findings) =
                         open::recording(config, recording, cell, self.reads_ahead)?;
-                    Some(graph.source(&stage.name, Box::new(Commanded::archived(source))))
+                    Node::source(Box::new(Commanded::archived(source)))
                 }
-                (Settings::Twin { config, model }, Some(input)) => {
-                    let of = (config, model.as_ref());
-                    Some(self.add_twin(&mut graph, stage, of, &input, recording)?)
+                (Settings::Twin { config, model }, Some(_)) => {
+                    self.twin(config, model.as_ref(), recording)?
                 }
-                (Settings::Detect { config, model }, Some(input)) => {
-                    let behind = stage.inputs.first().copied().unwrap_or(index);
+                (Settings::Detect { config, model }, Some(behind)) => {
                     let shared = Some(shared.entry(behind).or_default().clone());
                     let detect = build::detect(config, model.as_ref(), cell, shared)?;
-                    Some(graph.stage(&stage.name, Box::new(detect), &input)?)
+                    Node::stage(Box::new(detect))
                 }
                 (
                     Settings::Watch {
@@ -207,16 +209,16 @@ impl<'a> Replay<'a> {
                         model,
                         effort_cutoff_hz,
                     },
-                    Some(input),
+                    Some(_),
                 ) => {
                     let watch = build::watch(config, model.as_ref(), *effort_cutoff_hz, cell)?;
-                    Some(graph.stage(&stage.name, Box::new(watch), &input)?)
+                    Node::stage(Box::new(watch))
                 }
                 (Settings::Record(config), _) => {
                     if let Some(config) = redirect(config, out, &stem, &mut files) {
-                        self.add_recorder(&mut graph, stage, &config, &streams)?;
+                        self.add_recorder(&mut group, stage, &config, &streams)?;
                     }
-                    None
+                    continue;
                 }
                 (
                     Settings::Twin { .. }
@@ -225,22 +227,30 @@ impl<'a> Replay<'a> {
                     | Settings::Publish { .. }
                     | Settings::Outside(_),
                     _,
-                ) => None,
+                ) => continue,
             };
-            if let Some(stream) = stream {
-                streams.insert(index, stream);
+            let inputs = if node.is_source() {
+                Vec::new()
+            } else {
+                self.inputs(input)
+            };
+            group.add(node, Ends::new(&stage.name, inputs))?;
+            streams.insert(index);
+        }
+        let sinks: [(&str, Option<Box<dyn Sink + '_>>); 2] = [
+            ("observer", Some(Box::new(&mut observer))),
+            ("beside", beside),
+        ];
+        let stage_count = group.len();
+        for (name, sink) in sinks {
+            if let Some(sink) = sink {
+                let inputs = self.inputs(streams.iter().copied());
+                group.add(Node::sink(sink), Ends::new(name, inputs))?;
             }
         }
-        let inputs = self.inputs(&graph, streams.keys().copied(), &streams)?;
-        let stage_count = graph.len();
-        graph.sink("observer", Box::new(&mut observer), inputs);
-        if let Some(beside) = beside {
-            let inputs = self.inputs(&graph, streams.keys().copied(), &streams)?;
-            graph.sink("beside", beside, inputs);
-        }
-        let mut stages = graph.run(progress)?.ok_or(ReplayError::Interrupted)?;
+        let mut stages = run(&mut group, progress)?.ok_or(ReplayError::Interrupted)?;
         stages.truncate(stage_count);
-        drop(graph);
+        drop(group);
         observer.observed.note(&findings.get());
         Ok(observer.observed.into_outcome(cell, stem, stages, files))
     }
@@ -290,64 +300,49 @@ impl<'a> Replay<'a> {
         Ok(ArchivedTwin::open(recording, &topics, config, &setup)?)
     }
 
-    /// Adds the twin, recomputed or as in the recording.
-    fn add_twin(
+    /// The twin, recomputed or as in the recording.
+    fn twin<'n>(
         &self,
-        graph: &mut Graph<'_>,
-        stage: &Stage,
-        (config, model): (&tauscope_twin::Config, Option<&TwinFile>),
-        input: &Stream,
+        config: &tauscope_twin::Config,
+        model: Option<&TwinFile>,
         recording: &Path,
-    ) -> Result<Stream, ReplayError> {
+    ) -> Result<Node<'n>, ReplayError> {
         Ok(match self.twin {
             TwinChoice::Recompute => {
-                let twin = build::twin(config, model, self.cell())?;
-                graph.stage(&stage.name, Box::new(twin), input)?
+                Node::stage(Box::new(build::twin(config, model, self.cell())?))
             }
-            TwinChoice::Keep => graph.source(&stage.name, Box::new(self.open_twin(recording)?)),
+            TwinChoice::Keep => Node::source(Box::new(self.open_twin(recording)?)),
         })
     }
 
     fn add_recorder(
         &self,
-        graph: &mut Graph<'_>,
+        group: &mut Group<'_>,
         stage: &Stage,
         config: &tauscope_record::Config,
-        streams: &BTreeMap<usize, Stream>,
+        streams: &BTreeSet<usize>,
     ) -> Result<(), ReplayError> {
-        let listened: Vec<usize> = stage
-            .inputs
-            .iter()
-            .copied()
-            .filter(|input| streams.contains_key(input))
-            .collect();
+        let listened = stage.inputs.iter().copied();
+        let listened: Vec<usize> = listened.filter(|input| streams.contains(input)).collect();
         let recorder = self.pipeline.recorder(config, &listened)?;
-        let mut inputs = self.inputs(graph, listened.iter().copied(), streams)?;
-        for index in listened {
-            inputs.push(graph.listen_to_health(&streams[&index]));
-        }
-        graph.sink(&stage.name, Box::new(recorder), inputs);
+        let mut inputs = self.inputs(listened.iter().copied());
+        let names = listened.iter().map(|&index| self.name(index));
+        inputs.extend(names.map(Input::HealthOf));
+        group.add(
+            Node::sink(Box::new(recorder)),
+            Ends::new(&stage.name, inputs),
+        )?;
         Ok(())
     }
 
     /// Inputs for the streams of these stages.
-    fn inputs(
-        &self,
-        graph: &Graph<'_>,
-        stages: impl Iterator<Item = usize>,
-        streams: &BTreeMap<usize, Stream>,
-    ) -> Result<Vec<SinkInput>, ReplayError> {
-        let mut inputs = Vec::new();
-        for index in stages {
-            let stream = &streams[&index];
-            inputs.push(match self.pipeline.stages[index].role.gives() {
-                Some(SampleKind::JointState) => graph.listen::<JointState>(stream)?,
-                Some(SampleKind::TwinState) => graph.listen::<TwinState>(stream)?,
-                Some(SampleKind::Detection) => graph.listen::<Detection>(stream)?,
-                Some(SampleKind::Health) | None => continue,
-            });
-        }
-        Ok(inputs)
+    fn inputs(&self, stages: impl IntoIterator<Item = usize>) -> Vec<Input> {
+        let names = stages.into_iter().map(|index| self.name(index));
+        names.map(Input::Of).collect()
+    }
+
+    fn name(&self, index: usize) -> String {
+        self.pipeline.stages[index].name.clone()
     }
 }
 

@@ -8,12 +8,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use tauscope_bus::link::FanOut;
-use tauscope_bus::shell::tree::{Outlet, Post, Tree, Turn, branch};
-use tauscope_bus::shell::{Context, Ledger};
+use tauscope_bus::shell::{self, Context, Ends, Input, Node};
 use tauscope_bus::{
-    Detection, EffortUnit, Emit, JointState, LinkError, Progress, Sample, Source, Stage,
-    StageError, TwinState, flags,
+    EffortUnit, Emit, JointState, LinkError, Progress, Sample, Source, Stage, StageError,
+    TwinState, flags,
 };
 use tauscope_detect::{Config, DETECTORS, Threshold};
 use tauscope_pipeline::build;
@@ -297,24 +295,6 @@ fn from_source_to_alarm_nothing_is_allocated_for_a_sample() {
         },
         ..config
     };
-    let post = |stage: &str, from: &str| Post {
-        stage: stage.to_owned(),
-        restarts: 0,
-        from: from.to_owned(),
-        health: Box::new(FanOut::new(Vec::new())),
-        ledger: Ledger::default(),
-    };
-    let turn = Turn::default();
-    let detect: Box<dyn Stage<TwinState, Detection>> =
-        Box::new(build::detect(&config, None, &cell, None).unwrap());
-    let detect = branch(
-        &turn,
-        post("detect", "twin"),
-        detect,
-        Outlet::new(Vec::new(), None),
-    );
-    let out = Outlet::new(vec![detect], None);
-    let twin = branch(&turn, post("twin", "play"), twin(&cell), out);
     let allocated = Arc::new(AtomicUsize::new(usize::MAX));
     let samples = 10 * WARM;
     let player = Player {
@@ -323,9 +303,14 @@ fn from_source_to_alarm_nothing_is_allocated_for_a_sample() {
         before: 0,
         allocated: Arc::clone(&allocated),
     };
-    let out = Outlet::new(vec![twin], None);
-    let tree = Tree::of_source(&turn, post("play", ""), Box::new(player), out);
-    let reports = tree.run(&Context::new("play"));
+    let detect = build::detect(&config, None, &cell, None).unwrap();
+    let behind = |stage: &str, from: &str| Ends::new(stage, vec![Input::Of(from.to_owned())]);
+    let nodes = vec![
+        (Node::source(Box::new(player)), Ends::new("play", vec![])),
+        (Node::stage(twin(&cell)), behind("twin", "play")),
+        (Node::stage(Box::new(detect)), behind("detect", "twin")),
+    ];
+    let reports = shell::run(&Context::new("play"), nodes).unwrap();
     assert_eq!(reports[2].received, samples as u64);
     // The stages report ten times a second.
     let allocated = allocated.load(Ordering::Relaxed);

@@ -1,5 +1,6 @@
 //! Reports to the supervisor which commands the source of a cell accepts, when a mute ends, and when its clock jumps.
 
+use std::task::Waker;
 use std::time::Duration;
 
 use super::clock::Clock;
@@ -44,6 +45,10 @@ impl<S: Source<JointState>> Source<JointState> for Announced<S> {
             out,
             told: &mut self.told,
         })
+    }
+
+    fn register(&mut self, waker: &Waker) -> bool {
+        self.source.register(waker)
     }
 
     fn dropped(&self) -> u64 {

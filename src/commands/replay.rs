@@ -274,7 +274,7 @@ struct Summary<'a> {
     joints: &'a [String],
     twins: Vec<TwinSummary<'a>>,
     detectors: Vec<DetectorSummary<'a>>,
-    stages: &'a [tauscope_pipeline::graph::StageCounts],
+    stages: &'a [tauscope_pipeline::replay::StageCounts],
     files: &'a [PathBuf],
     notes: &'a [String],
 }

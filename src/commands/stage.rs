@@ -7,7 +7,7 @@ use std::process::{Command, ExitCode};
 
 use rustix::process::{Signal, set_parent_process_death_signal};
 use tauscope_bus::Seat;
-use tauscope_bus::shell::{self, Member, Unmade, crew};
+use tauscope_bus::shell::{self, Node, Unmade, worker};
 use tauscope_ingest::SimulatedRobot;
 use tauscope_pipeline::build::{self, BuildError};
 use tauscope_pipeline::cell::Cell;
@@ -59,11 +59,11 @@ enum SeatError {
 
 /// Reads the seats and runs their stages to their end.
 pub fn run(_args: &StageArgs) -> ExitCode {
-    crew(make)
+    worker(make)
 }
 
 /// Creates the stages of one group.
-fn make(seats: &[Seat]) -> Result<Vec<Member>, Unmade> {
+fn make(seats: &[Seat]) -> Result<Vec<Node<'static>>, Unmade> {
     // By their twin: detectors that receive the same samples, one after the other.
     let mut shared: BTreeMap<&str, tauscope_detect::Shared> = BTreeMap::new();
     let mut members = Vec::new();
@@ -102,7 +102,7 @@ fn tell_what_is_lost(seat: &Seat, kept: Option<&Path>) {
     }
 }
 
-fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatError> {
+fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Node<'static>, SeatError> {
     let told: Instructions = serde_json::from_value(seat.config.clone())?;
     let cells: Vec<Cell> = told
         .cells
@@ -117,7 +117,7 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
             let source = build::ingest(config, robot.as_ref(), cell()?, told.after_ns)?;
             let source = build::commanded(source, config, cell()?, told.somebody_learns)?;
             let source = Watched::new(&seat.stage, source, plausible::of_cell(cell()?));
-            Member::Source(Box::new(announce::commands::Announced::new(
+            Node::source(Box::new(announce::commands::Announced::new(
                 &seat.stage,
                 source,
             )))
@@ -126,7 +126,7 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
             let (model, cell) = (model.as_ref(), cell()?);
             let twin = build::twin(config, model, cell)?;
             let plausible = PlausibleTwin::new(config, model, cell);
-            Member::Twin(Box::new(WatchedTwin::new(&seat.stage, twin, plausible)))
+            Node::stage(Box::new(WatchedTwin::new(&seat.stage, twin, plausible)))
         }
         Settings::Detect { config, model } => {
             let mut config = config.clone();
@@ -136,7 +136,7 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
             }
             let detect = build::detect(&config, model.as_ref(), cell()?, Some(shared.clone()))?;
             let detect = Kept::new(detect, path);
-            Member::Judge(Box::new(Announced::new(
+            Node::stage(Box::new(Announced::new(
                 &seat.stage,
                 detect,
                 &cell()?.facts,
@@ -159,13 +159,13 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
             }
             tell_what_is_lost(seat, config.state.as_deref());
             let watch = Kept::new(watch, config.state.clone());
-            Member::Judge(Box::new(Announced::new(&seat.stage, watch, &cell.facts)))
+            Node::stage(Box::new(Announced::new(&seat.stage, watch, &cell.facts)))
         }
         Settings::Record(config) => {
             let cells: Vec<&Cell> = cells.iter().collect();
             let mut recorder = build::recorder(config, &cells, &told.streams, &told.provenance)?;
             recorder.repair_leftovers(config);
-            Member::Sink(Box::new(recorder))
+            Node::sink(Box::new(recorder))
         }
         Settings::Publish {
             config,
@@ -176,7 +176,7 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
             let (commands, streams) = (commands.as_ref(), &told.streams);
             let publisher =
                 build::publisher(config, commands, beside, cell()?, streams, restarted)?;
-            Member::Sink(Box::new(publisher))
+            Node::sink(Box::new(publisher))
         }
         Settings::Outside(_) => return Err(SeatError::Outside),
     })

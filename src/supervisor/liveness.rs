@@ -1,6 +1,6 @@
 //! Detection of hung stages. Each stage sends a heartbeat ten times per second, whether or not samples arrive. A
 //! stage without heartbeats is reported; if it stays hung, its process is killed and restarted. Stages of one thread
-//! stop together: their process reports which of them is hung, and the others only wait for it.
+//! stop together: their process reports which of them is hung, and the others wait for it.
 
 use std::time::Duration;
 
@@ -22,15 +22,14 @@ impl Supervisor<'_> {
         for index in 0..self.stages.len() {
             let stage = &self.stages[index];
             let unheard_for = stage.unheard_for(now).unwrap_or_default();
-            let (crew, name) = (stage.crew, stage.seat.stage.clone());
-            let stuck = self.stuck_in(crew, stage.root);
-            let only_waits = stuck.is_some_and(|stuck| stuck != name);
+            let (worker, name) = (stage.worker, stage.seat.stage.clone());
+            let only_waits = !stage.is_stuck() && self.is_stuck_elsewhere(worker);
             let hangs = unheard_for >= HANGS_AFTER && !only_waits;
             let is_new = self.stages[index].note_hangs(hangs);
             let seconds = unheard_for.as_secs();
             if hangs && is_new {
                 let left = KILLED_AFTER.saturating_sub(HANGS_AFTER).as_secs();
-                let id = self.crews[crew].process().map_or(0, Process::id);
+                let id = self.workers[worker].process().map_or(0, Process::id);
                 self.view.warn(&format!(
                     "warning: stage `{name}` hangs: nothing was heard of it for {seconds} s; its process {id} is \
                      killed in {left} s"
@@ -40,16 +39,15 @@ impl Supervisor<'_> {
                     .note(&format!("note: stage `{name}` responds again"));
             }
             if unheard_for >= KILLED_AFTER {
-                self.crews[crew].kill();
+                self.workers[worker].kill();
             }
         }
     }
 
-    /// Returns the hung stage of a thread, if its process reports one.
-    fn stuck_in(&self, crew: usize, root: usize) -> Option<&str> {
-        let mut tree = (self.stages.iter()).filter(|it| it.crew == crew && it.root == root);
-        let stuck = tree.find(|stage| stage.is_stuck());
-        stuck.map(|stage| stage.seat.stage.as_str())
+    /// Returns whether a process reports a hung stage, for which others of its threads wait.
+    fn is_stuck_elsewhere(&self, worker: usize) -> bool {
+        let mut stages = self.stages.iter().filter(|it| it.worker == worker);
+        stages.any(Local::is_stuck)
     }
 
     /// Reports the state of the run to the service manager.

@@ -11,33 +11,35 @@ use tauscope_pipeline::pipeline::{Pipeline, Role};
 use tokio::time::Instant;
 
 use super::Supervisor;
-use super::crew::Crew;
 use super::local::{FAILED, Local};
 use super::process::{self, Process};
+use super::worker::Worker;
 use crate::plan::{self, Link};
 
 /// Returns the stages with these seats, and the processes in which they run.
-pub(super) fn crews(
+pub(super) fn workers(
     pipeline: &Pipeline,
     links: &[Link],
     seats: Vec<(usize, Seat)>,
-) -> (Vec<Local>, Vec<Crew>) {
+) -> (Vec<Local>, Vec<Worker>) {
     let roots = plan::roots(pipeline, links);
     let here: BTreeMap<usize, usize> = seats
         .iter()
         .enumerate()
         .map(|(index, (at, _))| (*at, index))
         .collect();
-    let (mut stages, mut crews) = (Vec::new(), Vec::<Crew>::new());
+    let (mut stages, mut workers) = (Vec::new(), Vec::<Worker>::new());
     for (index, (at, seat)) in seats.into_iter().enumerate() {
         let stage = &pipeline.stages[at];
-        let place = crews.iter().position(|crew| crew.name == stage.process);
+        let place = workers
+            .iter()
+            .position(|worker| worker.name == stage.process);
         let place = place.unwrap_or_else(|| {
             let outside = matches!(stage.role, Role::Outside(_));
-            crews.push(Crew::new(&stage.process, outside));
-            crews.len() - 1
+            workers.push(Worker::new(&stage.process, outside));
+            workers.len() - 1
         });
-        crews[place].stages.push(index);
+        workers[place].stages.push(index);
         // All stages of a group are on one host.
         let root = here.get(&roots[at]).copied().unwrap_or(index);
         stages.push(Local::new(at, seat, place, root));
@@ -48,7 +50,7 @@ pub(super) fn crews(
         let root = stages[index].root;
         stages[root].restart_by(policy);
     }
-    (stages, crews)
+    (stages, workers)
 }
 
 impl Supervisor<'_> {
@@ -64,12 +66,15 @@ impl Supervisor<'_> {
 
     /// Starts a group, and its process if it does not run.
     pub(super) fn start(&mut self, root: usize) -> anyhow::Result<()> {
-        let tree = self.tree(root);
-        let seats: Vec<&Seat> = tree.iter().map(|&index| &self.stages[index].seat).collect();
-        let place = self.stages[root].crew;
-        let crew = &mut self.crews[place];
-        let line = crew.line(&seats)?;
-        let id = if let Some(process) = crew.process() {
+        let group = self.group(root);
+        let seats: Vec<&Seat> = group
+            .iter()
+            .map(|&index| &self.stages[index].seat)
+            .collect();
+        let place = self.stages[root].worker;
+        let worker = &mut self.workers[place];
+        let line = worker.line(&seats)?;
+        let id = if let Some(process) = worker.process() {
             process.tell(line);
             process.id()
         } else {
@@ -77,15 +82,15 @@ impl Supervisor<'_> {
             let folder = self.pipeline.path.parent().unwrap_or(Path::new(""));
             let command = process::command(settings, folder)?;
             // Per stage the seats of a group and a request to end, and the same once more.
-            let most_told = 4 * crew.stages.len() + 2;
-            let (name, mark) = (crew.name.clone(), (place, crew.life));
+            let most_told = 4 * worker.stages.len() + 2;
+            let (name, mark) = (worker.name.clone(), (place, worker.life));
             let events = self.sender.clone();
             let process = Process::start(command, &name, line, most_told, mark, events)?;
             let id = process.id();
-            crew.started(process);
+            worker.started(process);
             id
         };
-        for index in tree.into_iter().rev() {
+        for index in group.into_iter().rev() {
             let stage = &mut self.stages[index];
             stage.started();
             let name = &stage.seat.stage;
@@ -96,7 +101,7 @@ impl Supervisor<'_> {
     }
 
     /// Returns the stages of a group, its root first.
-    pub(super) fn tree(&self, root: usize) -> Vec<usize> {
+    pub(super) fn group(&self, root: usize) -> Vec<usize> {
         let all = 0..self.stages.len();
         all.filter(|&index| self.stages[index].root == root)
             .collect()
@@ -105,42 +110,42 @@ impl Supervisor<'_> {
     /// Returns whether nothing runs and nothing will be started.
     pub(super) fn is_over(&self) -> bool {
         self.stages.iter().all(Local::is_over)
-            && self.crews.iter().all(|crew| crew.process().is_none())
+            && self.workers.iter().all(|worker| worker.process().is_none())
     }
 
     /// Returns the stage of a process that a line is from.
-    pub(super) fn speaker(&self, crew: usize, line: &str) -> Option<usize> {
+    pub(super) fn speaker(&self, worker: usize, line: &str) -> Option<usize> {
         #[derive(Deserialize)]
         struct Named {
             stage: String,
         }
-        let crew = &self.crews[crew];
-        if let [only] = crew.stages.as_slice() {
+        let worker = &self.workers[worker];
+        if let [only] = worker.stages.as_slice() {
             return Some(*only);
         }
         let named: Named = serde_json::from_str(line).ok()?;
-        let mut stages = crew.stages.iter().copied();
+        let mut stages = worker.stages.iter().copied();
         stages.find(|&index| self.stages[index].seat.stage == named.stage)
     }
 
     /// Ends a group if all of its stages have reported their end.
-    pub(super) fn tree_ended(&mut self, root: usize) {
-        let tree = self.tree(root);
+    pub(super) fn group_ended(&mut self, root: usize) {
+        let group = self.group(root);
         let over = |&index: &usize| {
             let stage = &self.stages[index];
             stage.is_done() || !stage.is_running()
         };
-        if tree.iter().all(over) {
-            self.over(&tree, None);
+        if group.iter().all(over) {
+            self.over(&group, None);
             self.settle();
         }
     }
 
     /// Handles the exit of a process, after all of its output.
-    pub(super) fn process_ended(&mut self, crew: usize, status: &std::io::Result<ExitStatus>) {
-        let stages = self.crews[crew].stages.clone();
+    pub(super) fn process_ended(&mut self, worker: usize, status: &std::io::Result<ExitStatus>) {
+        let stages = self.workers[worker].stages.clone();
         let in_order = status.as_ref().is_ok_and(ExitStatus::success);
-        if let ([only], true, true) = (stages.as_slice(), self.crews[crew].outside, in_order)
+        if let ([only], true, true) = (stages.as_slice(), self.workers[worker].outside, in_order)
             && !self.stages[*only].was_killed()
             && !self.stages[*only].returns_always()
         {
@@ -149,15 +154,15 @@ impl Supervisor<'_> {
         }
         for root in stages {
             if self.stages[root].root == root && self.stages[root].is_running() {
-                let tree = self.tree(root);
-                self.over(&tree, Some(status));
+                let group = self.group(root);
+                self.over(&group, Some(status));
             }
         }
     }
 
     /// Ends or restarts a group that is over; `exit` is the exit status of its process, if that has exited.
-    fn over(&mut self, tree: &[usize], exit: Option<&std::io::Result<ExitStatus>>) {
-        let running: Vec<usize> = (tree.iter().copied())
+    fn over(&mut self, group: &[usize], exit: Option<&std::io::Result<ExitStatus>>) {
+        let running: Vec<usize> = (group.iter().copied())
             .filter(|&index| self.stages[index].is_running())
             .collect();
         let deaths: Vec<Option<String>> = running
@@ -196,11 +201,11 @@ impl Supervisor<'_> {
     }
 
     /// Closes the processes that have nothing left to do.
-    pub(super) fn close_crews(&mut self) {
-        for crew in &mut self.crews {
-            let mut stages = crew.stages.iter().map(|&index| &self.stages[index]);
-            if !crew.outside && stages.all(Local::is_over) {
-                crew.close(Instant::now());
+    pub(super) fn close_workers(&mut self) {
+        for worker in &mut self.workers {
+            let mut stages = worker.stages.iter().map(|&index| &self.stages[index]);
+            if !worker.outside && stages.all(Local::is_over) {
+                worker.close(Instant::now());
             }
         }
     }
@@ -209,24 +214,24 @@ impl Supervisor<'_> {
     pub(super) fn ask_to_end(&mut self, index: usize, recorder: bool) {
         if self.stages[index].is_to_end(recorder) {
             let stage = &self.stages[index];
-            self.crews[stage.crew].stop(&stage.seat.stage);
+            self.workers[stage.worker].stop(&stage.seat.stage);
         }
     }
 
     /// Ends a stage that does not end itself: kills its process or, if other stages still run in it, gives up its
     /// group.
     pub(super) fn kill_stubborn(&mut self, index: usize) {
-        let Local { crew, root, .. } = self.stages[index];
-        let tree = self.tree(root);
-        for &index in &tree {
+        let Local { worker, root, .. } = self.stages[index];
+        let group = self.group(root);
+        for &index in &group {
             self.stages[index].is_killed();
         }
-        let mut others = self.crews[crew].stages.iter();
-        if others.all(|other| tree.contains(other) || self.stages[*other].is_over()) {
-            self.crews[crew].kill();
+        let mut others = self.workers[worker].stages.iter();
+        if others.all(|other| group.contains(other) || self.stages[*other].is_over()) {
+            self.workers[worker].kill();
             return;
         }
-        self.over(&tree, None);
+        self.over(&group, None);
         self.settle();
     }
 }

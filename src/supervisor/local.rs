@@ -25,7 +25,7 @@ pub struct Local {
     /// Assignment that its process receives.
     pub seat: Seat,
     /// Its worker process, as an index into those of this host.
-    pub crew: usize,
+    pub worker: usize,
     /// Root of its group, as an index into the stages of this host. A group starts, ends and fails together.
     pub root: usize,
     /// Counts over all incarnations.
@@ -80,14 +80,14 @@ enum State {
 
 impl Local {
     /// Creates a stage that is to be started.
-    pub fn new(at: usize, mut seat: Seat, crew: usize, root: usize) -> Self {
+    pub fn new(at: usize, mut seat: Seat, worker: usize, root: usize) -> Self {
         let now = Instant::now();
         let kept = Kept::new(seat.inputs.len()).ok();
         seat.ledger = kept.as_ref().map(Kept::path);
         Self {
             at,
             seat,
-            crew,
+            worker,
             root,
             tally: Tally::default(),
             state: State::Waiting(now),

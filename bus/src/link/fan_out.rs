@@ -1,5 +1,6 @@
 //! One stream over several links.
 
+use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use super::{LinkError, Sender, SenderCounts};
@@ -57,10 +58,14 @@ impl<T: Sample> Sender<T> for FanOut<T> {
         })
     }
 
-    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        // The time counts from the end of the stream, so that stalled links do not add up.
-        self.links.iter_mut().try_fold(0, |missing, link| {
-            Ok(missing + link.wait_until_taken(timeout)?)
+    fn poll_taken(&mut self, timeout: Duration) -> Result<Poll<usize>, LinkError> {
+        let none = Poll::Ready(0);
+        self.links.iter_mut().try_fold(none, |all, link| {
+            let taken = link.poll_taken(timeout)?;
+            Ok(match (all, taken) {
+                (Poll::Ready(all), Poll::Ready(missing)) => Poll::Ready(all + missing),
+                _ => Poll::Pending,
+            })
         })
     }
 

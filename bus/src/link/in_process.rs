@@ -4,6 +4,7 @@ use std::any::Any;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::task::{Poll, Waker};
 use std::time::{Duration, Instant};
 
 use super::queue::{Message, Pushed, Queue};
@@ -231,17 +232,16 @@ impl<T: Sample> Sender<T> for InProcessSender<T> {
         Ok(missing(&mut readers))
     }
 
-    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+    fn poll_taken(&mut self, timeout: Duration) -> Result<Poll<usize>, LinkError> {
         let Some((end, since)) = &self.end else {
-            return Ok(0);
+            return Ok(Poll::Ready(0));
         };
-        loop {
-            let holders = Arc::strong_count(end) - 1;
-            if holders == 0 || since.elapsed() >= timeout {
-                return Ok(holders);
-            }
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        let holders = Arc::strong_count(end) - 1;
+        Ok(if holders == 0 || since.elapsed() >= timeout {
+            Poll::Ready(holders)
+        } else {
+            Poll::Pending
+        })
     }
 
     fn counts(&self) -> SenderCounts {
@@ -267,6 +267,11 @@ impl<T: Sample> Receiver<T> for InProcessReceiver<T> {
             }
         }
         Ok(Received::Nothing)
+    }
+
+    fn register(&mut self, waker: &Waker) -> Option<Duration> {
+        self.queue.register(waker);
+        None
     }
 
     fn counts(&self) -> ReceiverCounts {

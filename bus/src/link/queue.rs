@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::task::Waker;
 use std::time::{Duration, Instant};
 
 use super::{Keep, Position};
@@ -47,6 +48,8 @@ struct State<P> {
     /// Numbers of sleeping readers and writers. They change under the lock, so no wake-up is missed although a
     /// notification, which costs a system call, is sent only to a sleeper.
     sleeping: Sleeping,
+    /// Waker of an event loop that reads the queue.
+    waker: Option<Waker>,
 }
 
 #[derive(Debug, Default)]
@@ -67,6 +70,7 @@ impl<P> Queue<P> {
                 closed: false,
                 stuck: false,
                 sleeping: Sleeping::default(),
+                waker: None,
             }),
             filled: Condvar::new(),
             emptied: Condvar::new(),
@@ -122,10 +126,18 @@ impl<P> Queue<P> {
     fn append(&self, mut state: MutexGuard<'_, State<P>>, entry: Message<P>) {
         state.entries.push_back(entry);
         let wake = state.sleeping.readers > 0;
+        if let Some(waker) = &state.waker {
+            waker.wake_by_ref();
+        }
         drop(state);
         if wake {
             self.filled.notify_one();
         }
+    }
+
+    /// Wakes `waker` for every entry from now on.
+    pub(crate) fn register(&self, waker: &Waker) {
+        self.lock().waker = Some(waker.clone());
     }
 
     /// Takes the oldest entry, waiting at most `timeout` for one.

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
@@ -196,35 +197,25 @@ impl<T: Sample> Sender<T> for Spill<T> {
         inner.map_or(Ok(0), |inner| inner.wait_for_receivers(timeout))
     }
 
-    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        let shared = Arc::clone(&self.shared);
-        let mut state = shared.lock();
-        if !state.ended {
-            return Ok(0);
-        }
-        while state.returned.is_none() && state.failure.is_none() {
-            let left = timeout.saturating_sub(state.moved.elapsed());
-            if left.is_zero() {
-                break;
-            }
-            let moved = state.moved;
-            let pending = |state: &mut State<T>| {
-                state.returned.is_none() && state.failure.is_none() && state.moved == moved
-            };
-            state = wait(&shared.changed, state, left, pending);
-        }
+    fn poll_taken(&mut self, timeout: Duration) -> Result<Poll<usize>, LinkError> {
+        let mut state = self.shared.lock();
         if let Some(error) = state.failure.take() {
             return Err(error);
         }
-        let Some(mut inner) = state.returned.take() else {
+        if !state.ended {
+            return Ok(Poll::Ready(0));
+        }
+        let Some(inner) = &mut state.returned else {
+            if state.moved.elapsed() < timeout {
+                return Ok(Poll::Pending);
+            }
             // Part of the stream is not even sent yet.
             state.undelivered += state.held as u64 * self.receivers;
-            return Ok(self.receivers.max(1) as usize);
+            return Ok(Poll::Ready(self.receivers.max(1) as usize));
         };
-        drop(state);
-        let missing = inner.wait_until_taken(timeout)?;
-        self.shared.lock().undelivered = inner.counts().undelivered;
-        Ok(missing)
+        let taken = inner.poll_taken(timeout)?;
+        state.undelivered = inner.counts().undelivered;
+        Ok(taken)
     }
 
     fn counts(&self) -> SenderCounts {

@@ -1,6 +1,9 @@
 //! Opens the links of a seat.
 
+use std::any::Any;
+use std::os::fd::BorrowedFd;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::Waker;
 use std::time::Duration;
 
 use super::{Input, Output, OutputLink, Seat, TransportKind};
@@ -106,6 +109,22 @@ impl Links {
         Ok(())
     }
 
+    /// Opens the sending end of an `output` whose sample type is known at run time only; `None` without links.
+    ///
+    /// # Errors
+    /// See [`Links::sender`].
+    pub fn any_sender(&self, output: &Output) -> Result<Option<AnySender>, LinkError> {
+        if output.links.is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(match output.kind {
+            SampleKind::JointState => AnySender::new(self.sender::<JointState>(output)?),
+            SampleKind::TwinState => AnySender::new(self.sender::<TwinState>(output)?),
+            SampleKind::Detection => AnySender::new(self.sender::<Detection>(output)?),
+            SampleKind::Health => AnySender::new(self.sender::<Health>(output)?),
+        }))
+    }
+
     /// Opens the receiving end of `input`.
     ///
     /// # Errors
@@ -171,6 +190,36 @@ impl Transports {
     }
 }
 
+/// A sending end whose sample type is known at run time only.
+pub struct AnySender {
+    kind: SampleKind,
+    /// A `Box<dyn Sender<T>>` of the type that `kind` names.
+    sender: Box<dyn Any + Send>,
+}
+
+impl AnySender {
+    /// Erases the type of `sender`.
+    pub fn new<T: Sample>(sender: Box<dyn Sender<T>>) -> Self {
+        Self {
+            kind: T::KIND,
+            sender: Box::new(sender),
+        }
+    }
+
+    /// Returns the sender of the stream of `stage`, whose samples are of type `T`.
+    pub(crate) fn typed<T: Sample>(self, stage: &str) -> Result<Box<dyn Sender<T>>, LinkError> {
+        let kind = self.kind;
+        check::<T>(stage, kind)?;
+        let sender = self.sender.downcast::<Box<dyn Sender<T>>>();
+        // The kinds are equal, so the types are.
+        sender.map(|sender| *sender).map_err(|_| LinkError::Open {
+            stream: stage.to_owned(),
+            transport: "in process",
+            reason: format!("its sender is not one of {}", kind.type_name()),
+        })
+    }
+}
+
 /// A receiving end whose sample type is known at run time only.
 pub trait AnyReceiver: Send {
     /// See [`Receiver::receive`].
@@ -183,6 +232,12 @@ pub trait AnyReceiver: Send {
         read: &mut dyn FnMut(SampleRef<'_>),
     ) -> Result<Received, LinkError>;
 
+    /// See [`Receiver::register`].
+    fn register(&mut self, waker: &Waker) -> Option<Duration>;
+
+    /// See [`Receiver::descriptor`].
+    fn descriptor(&self) -> Option<BorrowedFd<'_>>;
+
     /// See [`Receiver::counts`].
     fn counts(&self) -> ReceiverCounts;
 
@@ -190,13 +245,21 @@ pub trait AnyReceiver: Send {
     fn position(&self) -> Option<Position>;
 }
 
-impl<T: Sample> AnyReceiver for Box<dyn Receiver<T>> {
+impl<T: Sample> AnyReceiver for Box<dyn Receiver<T> + '_> {
     fn receive(
         &mut self,
         timeout: Duration,
         read: &mut dyn FnMut(SampleRef<'_>),
     ) -> Result<Received, LinkError> {
         (**self).receive(timeout, &mut |sample| read(sample.as_ref()))
+    }
+
+    fn register(&mut self, waker: &Waker) -> Option<Duration> {
+        (**self).register(waker)
+    }
+
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        (**self).descriptor()
     }
 
     fn counts(&self) -> ReceiverCounts {
@@ -223,6 +286,6 @@ fn in_process(stream: &str) -> LinkError {
     LinkError::Open {
         stream: stream.to_owned(),
         transport: "in process",
-        reason: "its two stages are not in one tree".to_owned(),
+        reason: "its two stages are not in one group".to_owned(),
     }
 }

@@ -23,12 +23,13 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 use tokio::signal::unix::{SignalKind, signal};
 
+use super::event_loop;
+use super::group::{Ends, Group, Input, Node};
 use super::report::text_of;
-use super::tree::{Outlet, Post, Tree, Turn, branch};
 use super::{Board, Context, Ledger, Outcome, Report, Stop};
-use crate::link::{FanOut, LinkError, Receiver, Sender};
-use crate::sample::{Health, Sample};
-use crate::seat::{Links, Seat, Transports};
+use crate::link::LinkError;
+use crate::sample::{Sample, SampleKind};
+use crate::seat::{Links, Seat, TransportKind, Transports};
 use crate::stage::Stage;
 
 /// Reporting interval of a running stage; the work of a killed stage since its last report is unknown.
@@ -98,6 +99,9 @@ pub enum ChildError {
         /// Inputs and output of the seat.
         found: String,
     },
+    /// Event loop that cannot be started.
+    #[error("cannot start the event loop: {0}")]
+    System(#[source] io::Error),
     /// Link that cannot be opened.
     #[error(transparent)]
     Link(#[from] LinkError),
@@ -145,29 +149,22 @@ impl Child {
     /// Runs `stage` to its end.
     pub fn stage<I: Sample, O: Sample>(self, stage: &mut dyn Stage<I, O>) -> ExitCode {
         let Self { seat, context } = &self;
-        let report = reporting(&context.board, || {
-            let Seat { inputs, output, .. } = seat;
-            let ([input], Some(output)) = (inputs.as_slice(), output) else {
-                return Err(self.shape("one input and an output"));
+        let node = Node::stage(Box::new(stage));
+        let ready = node
+            .check_seat(seat)
+            .and_then(|()| Ok(ends(seat, &Transports::default())?));
+        let ran = ready.and_then(|ends| {
+            let group = move |pulse| {
+                let mut group = Group::under(pulse);
+                group.add(node, ends)?;
+                Ok(group)
             };
-            let links = Links::of(seat, &Transports::default());
-            let turn = Turn::default();
-            let out = Outlet::new(Vec::new(), Some(links.sender::<O>(output)?));
-            let post = Post {
-                stage: seat.stage.clone(),
-                restarts: seat.restarts,
-                from: input.from.clone(),
-                health: health_sender(&links, seat)?,
-                ledger: Ledger::of(seat),
-            };
-            let first = branch(&turn, post, Box::new(stage), out);
-            let open = Box::new(|| Ok(links.receiver::<I>(input)? as Box<dyn Receiver<I>>));
-            let mut tree = Tree::of_link(&turn, first, open);
-            tree.begin(context, seat.start_within(), &mut say_ready)?;
-            Ok(tree.run(context).pop().unwrap_or_default())
+            let within = seat.start_within();
+            let run = || event_loop::run(context, within, say_ready, group);
+            reporting(&context.board, run).map_err(ChildError::System)
         });
-        match report {
-            Ok(report) => done(report),
+        match ran {
+            Ok(mut reports) => done(reports.pop().unwrap_or_default()),
             Err(error) => self.fail(&error),
         }
     }
@@ -179,19 +176,6 @@ impl Child {
             outcome: Some(Outcome::Failed(text_of(error))),
             ..Report::default()
         })
-    }
-
-    fn shape(&self, expected: &'static str) -> ChildError {
-        let output = if self.seat.output.is_some() {
-            "an"
-        } else {
-            "no"
-        };
-        ChildError::Shape {
-            stage: self.seat.stage.clone(),
-            expected,
-            found: format!("{} inputs and {output} output", self.seat.inputs.len()),
-        }
     }
 }
 
@@ -241,15 +225,33 @@ where
     }
 }
 
-/// Opens the stream of health reports of the seat's stage.
-pub(super) fn health_sender(
-    links: &Links,
-    seat: &Seat,
-) -> Result<Box<dyn Sender<Health>>, LinkError> {
-    match &seat.health {
-        Some(output) => links.sender(output),
-        None => Ok(Box::new(FanOut::new(Vec::new()))),
-    }
+/// Opens the senders of a seat, and prepares its receivers.
+pub(super) fn ends(seat: &Seat, transports: &Transports) -> Result<Ends, LinkError> {
+    let open = |output| Links::of(seat, transports).any_sender(output);
+    let inputs = seat.inputs.iter().map(|input| {
+        let (from, links) = (input.from.clone(), Links::of(seat, transports));
+        match (input.transport, input.kind) {
+            (TransportKind::InProcess, SampleKind::Health) => Input::HealthOf(from),
+            (TransportKind::InProcess, _) => Input::Of(from),
+            (TransportKind::Iceoryx2 | TransportKind::Zenoh, _) => {
+                let input = input.clone();
+                let open = move || links.any_receiver(&input);
+                Input::Link {
+                    from,
+                    open: Box::new(open),
+                }
+            }
+        }
+    });
+    let health = seat.health.as_ref().map(open).transpose()?.flatten();
+    Ok(Ends {
+        stage: seat.stage.clone(),
+        restarts: seat.restarts,
+        inputs: inputs.collect(),
+        output: seat.output.as_ref().map(open).transpose()?.flatten(),
+        health: health.map(|health| health.typed(&seat.stage)).transpose()?,
+        ledger: Ledger::of(seat),
+    })
 }
 
 /// Runs `body` while another thread writes the reports on the status board at a fixed interval.

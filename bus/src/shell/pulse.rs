@@ -16,7 +16,7 @@ struct Beat {
 
 impl Pulse {
     /// Name of the current stage.
-    pub fn whose(&self) -> String {
+    pub fn current_stage(&self) -> String {
         self.name(self.0.at.load(Ordering::Relaxed))
     }
 
@@ -40,11 +40,14 @@ impl Pulse {
         names.get(place).cloned().unwrap_or_default()
     }
 
-    /// Registers a stage, and returns its index.
+    /// Registers a stage, and returns its index. A restarted stage keeps its index.
     pub fn place(&self, name: &str) -> usize {
         let mut names = self.0.names.lock().unwrap_or_else(PoisonError::into_inner);
-        names.push(name.to_owned());
-        names.len() - 1
+        let known = names.iter().position(|known| known == name);
+        known.unwrap_or_else(|| {
+            names.push(name.to_owned());
+            names.len() - 1
+        })
     }
 
     /// Runs the work of the stage at `place`, which stays the current stage after a panic. Called by one thread only.

@@ -164,7 +164,7 @@ impl Board {
         }
         // Without a heartbeat there is one stage.
         let stage = match &posted.pulse {
-            Some(pulse) => pulse.whose(),
+            Some(pulse) => pulse.current_stage(),
             None => posted.reports.first()?.stage.clone(),
         };
         Some((stage, silent_for))
@@ -188,36 +188,6 @@ impl Board {
 
     fn lock(&self) -> MutexGuard<'_, Posted> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// Posts reports at a fixed interval instead of for every sample.
-#[derive(Debug)]
-pub(super) struct Poster {
-    board: Board,
-    posted: Instant,
-}
-
-impl Poster {
-    /// Time between two reports.
-    /// Resolution: the cost of reporting.
-    const EVERY: Duration = Duration::from_millis(100);
-
-    pub(super) fn new(board: Board) -> Self {
-        Self {
-            board,
-            posted: Instant::now(),
-        }
-    }
-
-    /// Whether an update of the report is due.
-    pub(super) fn is_due(&self) -> bool {
-        self.posted.elapsed() >= Self::EVERY
-    }
-
-    pub(super) fn post(&mut self, reports: &[Report]) {
-        self.board.post(reports);
-        self.posted = Instant::now();
     }
 }
 

@@ -1,6 +1,7 @@
 //! Source and twin wrappers of a run that warn once about each implausibility in their samples.
 
 use std::collections::BTreeSet;
+use std::task::Waker;
 use std::time::Duration;
 
 use tauscope_bus::{
@@ -96,6 +97,10 @@ impl<S: Source<JointState>> Source<JointState> for Watched<S> {
             }
         };
         self.inner.step(&mut Seen { out, see })
+    }
+
+    fn register(&mut self, waker: &Waker) -> bool {
+        self.inner.register(waker)
     }
 
     fn dropped(&self) -> u64 {

@@ -5,9 +5,8 @@ use std::path::PathBuf;
 
 use tauscope_bus::{SampleRef, Sink, StageError};
 
-use super::Outcome;
+use super::{Outcome, StageCounts};
 use crate::cell::Cell;
-use crate::graph::StageCounts;
 use tauscope_session::{Finding, Plausible};
 
 use crate::plausible::{self, PlausibleTwin};

@@ -89,7 +89,7 @@ impl<T: Sample> Batch<T> {
                 Some(Progress::More)
                     if self.samples.0.len() < BATCH && self.steps.len() < BATCH => {}
                 // An idle source waits for a peer: forward its samples before that wait.
-                Some(Progress::More | Progress::Idle) => return true,
+                Some(Progress::More | Progress::Idle | Progress::Until(_)) => return true,
                 Some(Progress::End) | None => return false,
             }
         }

@@ -6,6 +6,7 @@
 
 mod inbox;
 
+use std::task::Waker;
 use std::time::Duration;
 
 use tauscope_bus::command::Answer;
@@ -164,6 +165,10 @@ impl Source<JointState> for Commanded {
             inbox.refuse_what_waits_too_long();
         }
         Ok(progress)
+    }
+
+    fn register(&mut self, waker: &Waker) -> bool {
+        self.inner.register(waker)
     }
 
     fn dropped(&self) -> u64 {

@@ -1,20 +1,14 @@
 //! Emits recorded or simulated samples at the rate of their stamps, or at a multiple of it.
 //!
-//! Only [`Paced`] delays samples by a clock. It wraps a source, so that the source itself needs none.
+//! Only [`Paced`] delays samples by a clock. It wraps a source, so that the source itself needs none. It does not
+//! sleep: it says when the next sample is due ([`Progress::Until`]).
 
 use std::collections::VecDeque;
-use std::num::NonZeroU64;
+use std::task::Waker;
 use std::time::{Duration, Instant};
 
-use rustix::thread::set_current_timer_slack;
 use tauscope_bus::{Emit, LinkError, Progress, Sample, Source, StageError, flags};
 
-/// Longest sleep of a step, so that it returns within a tenth of a second.
-/// Resolution: latency of a stop, against the number of wake-ups.
-const LONGEST_SLEEP: Duration = Duration::from_millis(50);
-/// Timer slack of a pacing thread \[ns\], so that one timer interrupt wakes many threads.
-/// Resolution: half a sample at 1 kHz. 150 cells need two interrupts a millisecond instead of 150.
-const SLACK_NS: u64 = 500_000;
 /// Longest gap in the stamps that is waited out \[ns\]; a longer one is skipped.
 /// Chosen: a pause of the robot within a session is waited out; a longer one is a break between sessions.
 const LONGEST_PAUSE_NS: i64 = 60_000_000_000;
@@ -30,8 +24,6 @@ pub struct Paced<S, T> {
     newest_ns: i64,
     held: VecDeque<T>,
     ended: bool,
-    /// Whether the timer slack of its thread has been set to [`SLACK_NS`].
-    slack: bool,
 }
 
 impl<S, T> Paced<S, T> {
@@ -44,7 +36,6 @@ impl<S, T> Paced<S, T> {
             newest_ns: 0,
             held: VecDeque::new(),
             ended: false,
-            slack: false,
         }
     }
 
@@ -78,10 +69,6 @@ impl<T: Sample> Emit<T> for Hold<'_, T> {
 
 impl<T: Sample, S: Source<T>> Source<T> for Paced<S, T> {
     fn step(&mut self, out: &mut dyn Emit<T>) -> Result<Progress, StageError> {
-        if !std::mem::replace(&mut self.slack, true) {
-            // Failure is harmless: without slack, the system wakes each thread separately.
-            let _ = set_current_timer_slack(NonZeroU64::new(SLACK_NS));
-        }
         if self.held.is_empty() {
             if self.ended {
                 return Ok(Progress::End);
@@ -89,22 +76,25 @@ impl<T: Sample, S: Source<T>> Source<T> for Paced<S, T> {
             match self.inner.step(&mut Hold(&mut self.held))? {
                 Progress::End => self.ended = true,
                 Progress::Idle => return Ok(Progress::Idle),
-                Progress::More => {}
+                Progress::More | Progress::Until(_) => {}
             }
         }
         let Some(header) = self.held.front().map(|sample| *sample.header()) else {
             return Ok(Progress::More);
         };
         let due = self.due(header.stamp_ns, header.has(flags::RESET));
-        let wait = due.saturating_duration_since(Instant::now());
-        std::thread::sleep(wait.min(LONGEST_SLEEP));
-        if wait <= LONGEST_SLEEP
-            && let Some(sample) = self.held.pop_front()
-        {
+        if due > Instant::now() {
+            return Ok(Progress::Until(due));
+        }
+        if let Some(sample) = self.held.pop_front() {
             self.newest_ns = header.stamp_ns;
             out.emit(&mut |slot| *slot = sample)?;
         }
         Ok(Progress::More)
+    }
+
+    fn register(&mut self, waker: &Waker) -> bool {
+        self.inner.register(waker)
     }
 
     fn dropped(&self) -> u64 {
@@ -154,7 +144,15 @@ mod tests {
         let mut source = Paced::new(Stamps(stamps), factor);
         let mut times = Times::default();
         let begin = Instant::now();
-        while source.step(&mut times).unwrap() != Progress::End {}
+        loop {
+            match source.step(&mut times).unwrap() {
+                Progress::End => break,
+                Progress::Until(due) => {
+                    std::thread::sleep(due.saturating_duration_since(Instant::now()));
+                }
+                Progress::More | Progress::Idle => {}
+            }
+        }
         let end = times.0.last().unwrap().0;
         let stamps = times.0.iter().map(|(_, ns)| ns / 1_000_000).collect();
         (end - begin, stamps)
@@ -165,17 +163,6 @@ mod tests {
         let (took, stamps) = run(&[1000, 1100, 1200, 1300], 2.0);
         assert_eq!(stamps, [1000, 1100, 1200, 1300]);
         assert!(took >= Duration::from_millis(149), "{took:?}");
-    }
-
-    #[test]
-    fn the_system_may_wake_several_at_once_and_none_is_late_for_long() {
-        let worked = std::thread::spawn(|| {
-            let (took, _) = run(&[0, 20, 40], 1.0);
-            (took, rustix::thread::current_timer_slack().unwrap())
-        });
-        let (took, slack_ns) = worked.join().unwrap();
-        assert_eq!(slack_ns, SLACK_NS);
-        assert!(took >= Duration::from_millis(40), "{took:?}");
     }
 
     #[test]

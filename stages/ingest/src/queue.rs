@@ -1,14 +1,13 @@
 //! Bounded queue of received messages. When it is full, the oldest message is dropped.
 
 use std::collections::VecDeque;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::task::Waker;
 
 /// The queue between the receiving threads and the thread of the stage.
 #[derive(Debug)]
 pub(crate) struct Queue<T> {
     state: Mutex<State<T>>,
-    filled: Condvar,
     capacity: usize,
 }
 
@@ -16,6 +15,8 @@ pub(crate) struct Queue<T> {
 struct State<T> {
     messages: VecDeque<T>,
     overflowed: u64,
+    /// Waker of the thread of the stage.
+    waker: Option<Waker>,
 }
 
 impl<T> Queue<T> {
@@ -24,8 +25,8 @@ impl<T> Queue<T> {
             state: Mutex::new(State {
                 messages: VecDeque::new(),
                 overflowed: 0,
+                waker: None,
             }),
-            filled: Condvar::new(),
             capacity: capacity.max(1),
         }
     }
@@ -38,19 +39,19 @@ impl<T> Queue<T> {
             state.overflowed += 1;
         }
         state.messages.push_back(message);
-        drop(state);
-        self.filled.notify_one();
+        if let Some(waker) = &state.waker {
+            waker.wake_by_ref();
+        }
     }
 
-    /// Removes the oldest message; waits at most `patience` for one.
-    pub fn pop(&self, patience: Duration) -> Option<T> {
-        let state = self.lock();
-        let empty = |state: &mut State<T>| state.messages.is_empty();
-        let (mut state, _) = self
-            .filled
-            .wait_timeout_while(state, patience, empty)
-            .unwrap_or_else(PoisonError::into_inner);
-        state.messages.pop_front()
+    /// Wakes `waker` for every message from now on.
+    pub fn register(&self, waker: &Waker) {
+        self.lock().waker = Some(waker.clone());
+    }
+
+    /// Removes the oldest message.
+    pub fn pop(&self) -> Option<T> {
+        self.lock().messages.pop_front()
     }
 
     /// Returns the number of dropped messages.
@@ -74,17 +75,24 @@ mod tests {
         for i in 0..5 {
             queue.push(i);
         }
-        let took: Vec<_> = std::iter::from_fn(|| queue.pop(Duration::ZERO)).collect();
+        let took: Vec<_> = std::iter::from_fn(|| queue.pop()).collect();
         assert_eq!(took, [2, 3, 4]);
         assert_eq!(queue.overflowed(), 2);
     }
 
     #[test]
     fn whoever_waits_is_woken() {
-        let queue = std::sync::Arc::new(Queue::new(3));
-        let other = std::sync::Arc::clone(&queue);
-        let waiter = std::thread::spawn(move || other.pop(Duration::from_secs(10)));
+        struct Count(std::sync::atomic::AtomicUsize);
+        impl std::task::Wake for Count {
+            fn wake(self: std::sync::Arc<Self>) {
+                self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            }
+        }
+        let count = std::sync::Arc::new(Count(0.into()));
+        let queue = Queue::new(3);
+        queue.register(&std::sync::Arc::clone(&count).into());
         queue.push(7);
-        assert_eq!(waiter.join().unwrap(), Some(7));
+        assert_eq!(count.0.load(std::sync::atomic::Ordering::Relaxed), 1);
+        assert_eq!(queue.pop(), Some(7));
     }
 }

@@ -11,6 +11,7 @@ mod recipe;
 mod wire;
 
 use std::sync::Arc;
+use std::task::Waker;
 use std::time::Duration;
 
 use tauscope_archive::ros;
@@ -28,9 +29,6 @@ use field::{JOINTS, Part};
 
 /// Longest wait of a sample for its other parts \[ns\]: none, since all parts come in one package.
 const WAIT_NS: i64 = 0;
-/// Longest wait of a step for a package.
-/// Resolution: latency of a stop, against the number of wake-ups.
-const LONGEST_WAIT: Duration = Duration::from_millis(50);
 /// Maximum number of packages per step.
 /// Resolution: latency of a stop, against the cost of a step.
 const PACKAGES_PER_STEP: usize = 64;
@@ -162,9 +160,8 @@ impl Drop for UrRtdeSource {
 impl Source<JointState> for UrRtdeSource {
     fn step(&mut self, out: &mut dyn Emit<JointState>) -> Result<Progress, StageError> {
         let mut progress = Progress::Idle;
-        for i in 0..PACKAGES_PER_STEP {
-            let patience = if i == 0 { LONGEST_WAIT } else { Duration::ZERO };
-            let Some(data) = self.shared.queue.pop(patience) else {
+        for _ in 0..PACKAGES_PER_STEP {
+            let Some(data) = self.shared.queue.pop() else {
                 return Ok(progress);
             };
             self.take(&data);
@@ -174,6 +171,11 @@ impl Source<JointState> for UrRtdeSource {
             }
         }
         Ok(Progress::More)
+    }
+
+    fn register(&mut self, waker: &Waker) -> bool {
+        self.shared.queue.register(waker);
+        true
     }
 
     fn dropped(&self) -> u64 {

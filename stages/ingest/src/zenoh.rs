@@ -17,7 +17,8 @@ mod watch;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::{Duration, SystemTime};
+use std::task::Waker;
+use std::time::{Duration, Instant, SystemTime};
 
 use tauscope_archive::ros::{self, Message};
 use tauscope_bus::{Emit, JointState, Progress, Source, StageError, Trouble, flags, zenoh_reason};
@@ -39,10 +40,7 @@ use watch::Watch;
 /// Longest wait of a sample for the command of its instant \[ns\].
 /// Chosen: a few samples at 500 Hz; longer would delay each sample without a command by as much.
 const WAIT_NS: i64 = 10_000_000;
-/// Longest wait of a step for a message.
-/// Resolution: latency of a stop, against the number of wake-ups.
-const LONGEST_WAIT: Duration = Duration::from_millis(50);
-/// Longest wait of a step for a message while a sample waits for its command.
+/// Time to the next step while a sample waits for its command.
 /// Resolution: the delay of a sample without a command, against the number of wake-ups.
 const SHORTEST_WAIT: Duration = Duration::from_millis(2);
 /// Maximum number of messages per step.
@@ -252,13 +250,8 @@ impl ZenohSource {
 impl Source<JointState> for ZenohSource {
     fn step(&mut self, out: &mut dyn Emit<JointState>) -> Result<Progress, StageError> {
         let mut progress = Progress::Idle;
-        for i in 0..MESSAGES_PER_STEP {
-            let patience = match (i, self.packer.is_waiting()) {
-                (0, false) => LONGEST_WAIT,
-                (0, true) => SHORTEST_WAIT,
-                _ => Duration::ZERO,
-            };
-            let waiting = self.queue.pop(patience);
+        for _ in 0..MESSAGES_PER_STEP {
+            let waiting = self.queue.pop();
             if let Some(waiting) = &waiting {
                 self.take(waiting);
             }
@@ -273,10 +266,20 @@ impl Source<JointState> for ZenohSource {
                 progress = Progress::More;
             }
             if waiting.is_none() {
-                return Ok(progress);
+                return Ok(match progress {
+                    Progress::Idle if self.packer.is_waiting() => {
+                        Progress::Until(Instant::now() + SHORTEST_WAIT)
+                    }
+                    progress => progress,
+                });
             }
         }
         Ok(Progress::More)
+    }
+
+    fn register(&mut self, waker: &Waker) -> bool {
+        self.queue.register(waker);
+        true
     }
 
     fn dropped(&self) -> u64 {

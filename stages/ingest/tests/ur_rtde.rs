@@ -8,7 +8,7 @@
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
-use crate::common::{Collect, cell};
+use crate::common::{Collect, cell, step};
 use crate::ur_controller::{Behaviour, Controller, Instant as Measured};
 use tauscope_bus::{JointState, Source, Trouble, flags};
 use tauscope_ingest::{Config, Setup, UrEffort, UrRtdeConfig, UrRtdeSource};
@@ -47,7 +47,7 @@ fn receive(source: &mut UrRtdeSource, count: usize) -> Vec<JointState> {
     let mut out = Collect(Vec::new());
     while out.0.len() < count {
         assert!(Instant::now() < deadline, "{} of {count} came", out.0.len());
-        source.step(&mut out).unwrap();
+        step(source, &mut out);
     }
     out.0
 }
@@ -113,7 +113,7 @@ fn said(settings: &UrRtdeConfig) -> Trouble {
     let began = Instant::now();
     let mut out = Collect(Vec::new());
     loop {
-        source.step(&mut out).unwrap();
+        step(&mut source, &mut out);
         if let Some(trouble) = source.trouble(began.elapsed()) {
             assert!(out.0.is_empty());
             return trouble;

@@ -1,10 +1,13 @@
 //! The receiving end over iceoryx2.
 
+use std::os::fd::BorrowedFd;
+use std::task::Waker;
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::FileDescriptorBased as _;
 use iceoryx2::prelude::{CallbackProgression, EventId, PortFactory as _};
 use iceoryx2::service::ipc_threadsafe::Service;
 
@@ -158,6 +161,11 @@ impl<T: Sample> Receiver<T> for SharedMemoryReceiver<T> {
         read: &mut dyn FnMut(&T),
     ) -> Result<Received, LinkError> {
         let deadline = Instant::now() + timeout;
+        if let (Waiting::Woken(by, _), true) = (&self.waiting, timeout.is_zero()) {
+            // An event loop waits for the descriptor, which stays readable until the events are taken. A sample that
+            // is sent after this line makes it readable again.
+            wait(by, timeout, |_| {}).map_err(|e| self.error(&e))?;
+        }
         loop {
             let received = self.take(read)?;
             if received != Received::Nothing {
@@ -184,6 +192,20 @@ impl<T: Sample> Receiver<T> for SharedMemoryReceiver<T> {
         }
     }
 
+    fn register(&mut self, _waker: &Waker) -> Option<Duration> {
+        match self.waiting {
+            Waiting::Woken(_, pause) => Some(pause).filter(|pause| *pause < Duration::MAX),
+            Waiting::Looks(pause) => Some(pause),
+        }
+    }
+
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        match &self.waiting {
+            Waiting::Woken(by, _) => Some(descriptor(by)),
+            Waiting::Looks(_) => None,
+        }
+    }
+
     fn counts(&self) -> ReceiverCounts {
         self.tracker.counts()
     }
@@ -194,5 +216,14 @@ impl<T: Sample> Receiver<T> for SharedMemoryReceiver<T> {
 
     fn resume(&mut self, position: Position) {
         self.tracker.resume(position);
+    }
+}
+
+/// Descriptor that is readable while `listener` has events.
+fn descriptor(listener: &Listener<Service>) -> BorrowedFd<'_> {
+    // SAFETY: the handle is only read, and the listener keeps it open while it lives.
+    #[allow(unsafe_code)]
+    unsafe {
+        BorrowedFd::borrow_raw(listener.file_descriptor().native_handle())
     }
 }

@@ -1,6 +1,7 @@
 //! The sending end over iceoryx2.
 
 use std::sync::Arc;
+use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::listener::Listener;
@@ -216,15 +217,16 @@ impl<T: Sample> Sender<T> for SharedMemorySender<T> {
         }
     }
 
-    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        loop {
-            let left = timeout.saturating_sub(self.ended_at.elapsed());
-            let missing = self.ended.saturating_sub(self.taken);
-            if missing == 0 || left.is_zero() {
-                return Ok(missing);
-            }
-            self.listen(left.min(LOOK_EVERY))?;
+    fn poll_taken(&mut self, timeout: Duration) -> Result<Poll<usize>, LinkError> {
+        if self.ended > self.taken {
+            self.listen(Duration::ZERO)?;
         }
+        let missing = self.ended.saturating_sub(self.taken);
+        Ok(if missing == 0 || self.ended_at.elapsed() >= timeout {
+            Poll::Ready(missing)
+        } else {
+            Poll::Pending
+        })
     }
 
     fn counts(&self) -> SenderCounts {

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::Waker;
 use std::time::{Duration, Instant};
 
 use zenoh::Wait as _;
@@ -226,7 +227,7 @@ impl<T: Sample> ZenohReceiver<T> {
                     && (told.instance != position.instance
                         || taken >= (self.depth as u64 / 4).max(1)
                         || at.elapsed() >= TELL_EVERY)
-                    || (received == Received::Nothing && (moved || at.elapsed() >= TELL_AGAIN))
+                    || (received == Received::Nothing && at.elapsed() >= TELL_AGAIN)
             }
         };
         if due || received == Received::End {
@@ -306,6 +307,11 @@ impl<T: Sample> Receiver<T> for ZenohReceiver<T> {
         }
         self.tell_progress(received)?;
         Ok(received)
+    }
+
+    fn register(&mut self, waker: &Waker) -> Option<Duration> {
+        self.heard.queue.register(waker);
+        None
     }
 
     fn counts(&self) -> ReceiverCounts {

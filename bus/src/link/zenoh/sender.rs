@@ -1,6 +1,7 @@
 //! The sending end over Zenoh.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use zenoh::Wait as _;
@@ -262,19 +263,19 @@ impl<T: Sample> Sender<T> for ZenohSender<T> {
         }
     }
 
-    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+    fn poll_taken(&mut self, timeout: Duration) -> Result<Poll<usize>, LinkError> {
         let mut state = self.shared.lock();
-        while state.failure.is_none() && state.log.is_awaited(Instant::now(), timeout) {
-            state = wait(&self.shared.changed, state, LOOK_EVERY);
-        }
-        let untaken = state.log.untaken();
         if let Some(error) = state.failure.take() {
             return Err(error);
         }
+        if state.log.is_awaited(Instant::now(), timeout) {
+            return Ok(Poll::Pending);
+        }
+        let untaken = state.log.untaken();
         if untaken > 0 {
             state.log.abandon();
         }
-        Ok(untaken)
+        Ok(Poll::Ready(untaken))
     }
 
     fn counts(&self) -> SenderCounts {

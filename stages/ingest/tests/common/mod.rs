@@ -25,6 +25,14 @@ impl<T: Sample> Emit<T> for Collect<T> {
     }
 }
 
+/// Makes a step of a live source, and waits after one without data, in place of an event loop.
+pub fn step<T: Sample>(source: &mut impl Source<T>, out: &mut Collect<T>) {
+    let progress = source.step(out).unwrap();
+    if matches!(progress, Progress::Idle | Progress::Until(_)) {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+}
+
 /// Returns all samples of a source that ends.
 pub fn drain<T: Sample>(source: &mut impl Source<T>) -> Vec<T> {
     let mut out = Collect(Vec::new());

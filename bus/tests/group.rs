@@ -5,8 +5,8 @@
 
 use std::sync::{Arc, Mutex};
 
-use tauscope_bus::shell::tree::{Branch, Outlet, Post, Tree, Turn, branch};
-use tauscope_bus::shell::{Context, Ledger, Outcome, Report};
+use tauscope_bus::seat::AnySender;
+use tauscope_bus::shell::{self, Context, Ends, Input, Node, Outcome, Report};
 use tauscope_bus::{
     Audience, Detection, Emit, InProcess, JointState, Keep, Progress, Received, Receiver, Source,
     Stage, StageError, Transport, TwinState,
@@ -77,15 +77,9 @@ impl Stage<TwinState, Detection> for Detector {
     }
 }
 
-fn post(links: &InProcess, stage: &str, from: &str) -> Post<'static> {
-    let health = links.sender(&format!("{stage}/health"), Audience::default());
-    Post {
-        stage: stage.to_owned(),
-        restarts: 0,
-        from: from.to_owned(),
-        health: health.unwrap(),
-        ledger: Ledger::default(),
-    }
+/// The stage of that name behind another.
+fn behind(stage: &str, from: &str) -> Ends {
+    Ends::new(stage, vec![Input::Of(from.to_owned())])
 }
 
 /// A source, a twin whose stream also has a receiver outside the group, and two detectors, the second in this mood.
@@ -93,20 +87,22 @@ fn run(mood: Mood) -> (Vec<Report>, Vec<(&'static str, i64)>, Vec<i64>) {
     let links = InProcess::new();
     let mut outside: Box<dyn Receiver<TwinState>> =
         links.receiver("c/twin", Keep::All, 1_024).unwrap();
-    let link = links.sender("c/twin", Audience::of(Keep::All, 1)).unwrap();
+    let link = links.sender::<TwinState>("c/twin", Audience::of(Keep::All, 1));
     let heard = Heard::default();
-    let turn = Turn::default();
-    let detectors = [("one", Mood::Well), ("two", mood)].map(|(name, mood)| {
-        let stage = Detector(name, Arc::clone(&heard), mood);
-        let out = Outlet::new(Vec::new(), None);
-        branch(&turn, post(&links, name, "twin"), Box::new(stage), out)
-    });
-    let out = Outlet::new(detectors.into(), Some(link));
-    let twin: Box<dyn Branch<JointState>> =
-        branch(&turn, post(&links, "twin", "count"), Box::new(Twin), out);
-    let out = Outlet::new(vec![twin], None);
-    let source = Box::new(Counter(0));
-    let tree = Tree::of_source(&turn, post(&links, "count", ""), source, out);
+    let detector = |name, mood| Node::stage(Box::new(Detector(name, Arc::clone(&heard), mood)));
+    let twin = Ends {
+        output: Some(AnySender::new(link.unwrap())),
+        ..behind("twin", "count")
+    };
+    let nodes = vec![
+        (
+            Node::source(Box::new(Counter(0))),
+            Ends::new("count", vec![]),
+        ),
+        (Node::stage(Box::new(Twin)), twin),
+        (detector("one", Mood::Well), behind("one", "twin")),
+        (detector("two", mood), behind("two", "twin")),
+    ];
     let soon = std::time::Duration::from_millis(500);
     let (reports, seen) = std::thread::scope(|scope| {
         let seen = scope.spawn(move || {
@@ -115,7 +111,7 @@ fn run(mood: Mood) -> (Vec<Report>, Vec<(&'static str, i64)>, Vec<i64>) {
             while outside.receive(soon, read).unwrap() == Received::Sample {}
             seen
         });
-        let reports = tree.run(&Context::new("count"));
+        let reports = shell::run(&Context::new("count"), nodes).unwrap();
         (reports, seen.join().unwrap())
     });
     let heard = heard.lock().unwrap().clone();
@@ -124,21 +120,18 @@ fn run(mood: Mood) -> (Vec<Report>, Vec<(&'static str, i64)>, Vec<i64>) {
 
 #[test]
 fn a_stage_that_hangs_is_named_though_others_share_its_thread() {
-    let links = InProcess::new();
-    let turn = Turn::default();
     let (go_on, until_it_may) = std::sync::mpsc::channel();
-    let out = Outlet::new(Vec::new(), None);
-    let stuck = Box::new(Stuck(until_it_may));
-    let stuck = branch(&turn, post(&links, "stuck", "twin"), stuck, out);
-    let heard = Heard::default();
-    let well = Detector("well", Arc::clone(&heard), Mood::Well);
-    let out = Outlet::new(Vec::new(), None);
-    let well = branch(&turn, post(&links, "well", "twin"), Box::new(well), out);
-    let out = Outlet::new(vec![well, stuck], None);
-    let twin: Box<dyn Branch<JointState>> =
-        branch(&turn, post(&links, "twin", "count"), Box::new(Twin), out);
-    let out = Outlet::new(vec![twin], None);
-    let tree = Tree::of_source(&turn, post(&links, "count", ""), Box::new(Counter(0)), out);
+    let stuck = Node::stage(Box::new(Stuck(until_it_may)));
+    let well = Detector("well", Heard::default(), Mood::Well);
+    let nodes = vec![
+        (
+            Node::source(Box::new(Counter(0))),
+            Ends::new("count", vec![]),
+        ),
+        (Node::stage(Box::new(Twin)), behind("twin", "count")),
+        (Node::stage(Box::new(well)), behind("well", "twin")),
+        (stuck, behind("stuck", "twin")),
+    ];
     let context = Context::new("count");
     let board = context.board.clone();
     let soon = std::time::Duration::from_mins(1);
@@ -152,7 +145,7 @@ fn a_stage_that_hangs_is_named_though_others_share_its_thread() {
             go_on.send(()).unwrap();
             assert_eq!(found.map(|(stage, _)| stage).as_deref(), Some("stuck"));
         });
-        let reports = tree.run(&context);
+        let reports = shell::run(&context, nodes).unwrap();
         assert!(reports.iter().all(Report::is_complete), "{reports:?}");
     });
     // A group that has ended is not hung.

@@ -212,8 +212,8 @@ impl Supervisor<'_> {
                 None => {}
             }
         }
-        for crew in &mut self.crews {
-            crew.kill_if_it_stays(now);
+        for worker in &mut self.workers {
+            worker.kill_if_it_stays(now);
         }
     }
 }

@@ -19,6 +19,14 @@ struct State {
 }
 
 impl Turn {
+    /// The state of a group whose thread has this heartbeat.
+    pub(super) fn under(pulse: Pulse) -> Self {
+        Self(Rc::new(State {
+            pulse,
+            ..State::default()
+        }))
+    }
+
     /// Registers a stage, and returns its index.
     pub(super) fn place(&self, name: &str) -> usize {
         self.0.pulse.place(name)
@@ -48,8 +56,8 @@ impl Turn {
     }
 
     /// Name of the current stage.
-    pub(super) fn whose(&self) -> String {
-        self.0.pulse.whose()
+    pub(super) fn current_stage(&self) -> String {
+        self.0.pulse.current_stage()
     }
 
     /// Fails if a stage has failed, even if the preceding stages did not pass the failure on.
@@ -67,7 +75,7 @@ impl Turn {
     pub(super) fn failure(&self, error: StageError) -> (String, StageError) {
         match self.0.failure.take() {
             Some((place, error)) => (self.name(place), error),
-            None => (self.whose(), error),
+            None => (self.current_stage(), error),
         }
     }
 

@@ -8,7 +8,7 @@ use super::process::Process;
 
 /// A worker process of this host.
 #[derive(Debug)]
-pub struct Crew {
+pub struct Worker {
     /// Its name.
     pub name: String,
     /// Its stages, as indices into those of this host.
@@ -22,7 +22,7 @@ pub struct Crew {
     closing: Option<Patience>,
 }
 
-impl Crew {
+impl Worker {
     /// Creates a worker that has not been started.
     pub fn new(name: &str, outside: bool) -> Self {
         Self {
