@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use crate::sample::Sample;
+use crate::sample::{Sample, SampleKind};
 
 mod fan_out;
 mod in_process;
@@ -154,6 +154,18 @@ pub enum LinkError {
     },
 }
 
+impl LinkError {
+    /// A stream of another type than expected; `found` is `None` if there is no stream.
+    pub(crate) fn mismatch(stream: &str, expected: SampleKind, found: Option<SampleKind>) -> Self {
+        let name = |kind: SampleKind| kind.type_name().to_owned();
+        Self::TypeMismatch {
+            stream: stream.to_owned(),
+            expected: name(expected),
+            found: found.map_or_else(|| "no stream".to_owned(), name),
+        }
+    }
+}
+
 /// Counters of a sending end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct SenderCounts {
@@ -256,6 +268,7 @@ pub trait Sender<T: Sample>: Send {
     /// Ready after [`Sender::end`] once every connected receiver has taken the end and so all samples before it, or
     /// when the wait is over. Returns the number of receivers that have not. A process that exits earlier may lose
     /// unread samples.
+    /// It is not called again once it is ready.
     ///
     /// The wait ends `timeout` after the end or after the last progress that the transport knows of, whichever is
     /// later, as the user timeout of TCP (RFC 5482): a slow receiver is no reason to give up.

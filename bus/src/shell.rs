@@ -77,7 +77,7 @@ impl Context {
 ///
 /// # Errors
 /// If the system has no more descriptors. The failure of a stage is in its report.
-pub fn run<'a>(context: &Context, nodes: Vec<(Node<'a>, Ends)>) -> std::io::Result<Vec<Report>> {
+pub fn run(context: &Context, nodes: Vec<(Node<'_>, Ends)>) -> std::io::Result<Vec<Report>> {
     let group = move |pulse| {
         let mut group = Group::under(pulse);
         for (node, ends) in nodes {

@@ -177,66 +177,23 @@ impl<'a> Replay<'a> {
         let cell = self.cell();
         let stem = stem(recording);
         let mut observer = Observer::new(cell, self.plausible_twins());
-        let mut files = Vec::new();
-        let mut findings = Findings::default();
         let mut group = Group::default();
-        // The stages whose streams are there.
-        let mut streams: BTreeSet<usize> = BTreeSet::new();
-        // Detectors behind one twin process the same samples, so they can share derived values.
-        let mut shared: BTreeMap<usize, tauscope_detect::Shared> = BTreeMap::new();
+        let mut built = Built::default();
         for &index in &self.members {
             let stage = &self.pipeline.stages[index];
-            let input = stage.inputs.first();
-            let input = input.copied().filter(|input| streams.contains(input));
-            let node = match (&stage.settings, input) {
-                (Settings::Ingest(config), _) => {
-                    let source;
-                    (source, findings) =
-                        open::recording(config, recording, cell, self.reads_ahead)?;
-                    Node::source(Box::new(Commanded::archived(source)))
+            if let Some((node, inputs)) = self.node(stage, (recording, out), &mut built)? {
+                if !node.is_sink() {
+                    built.streams.insert(index);
                 }
-                (Settings::Twin { config, model }, Some(_)) => {
-                    self.twin(config, model.as_ref(), recording)?
-                }
-                (Settings::Detect { config, model }, Some(behind)) => {
-                    let shared = Some(shared.entry(behind).or_default().clone());
-                    let detect = build::detect(config, model.as_ref(), cell, shared)?;
-                    Node::stage(Box::new(detect))
-                }
-                (
-                    Settings::Watch {
-                        config,
-                        model,
-                        effort_cutoff_hz,
-                    },
-                    Some(_),
-                ) => {
-                    let watch = build::watch(config, model.as_ref(), *effort_cutoff_hz, cell)?;
-                    Node::stage(Box::new(watch))
-                }
-                (Settings::Record(config), _) => {
-                    if let Some(config) = redirect(config, out, &stem, &mut files) {
-                        self.add_recorder(&mut group, stage, &config, &streams)?;
-                    }
-                    continue;
-                }
-                (
-                    Settings::Twin { .. }
-                    | Settings::Detect { .. }
-                    | Settings::Watch { .. }
-                    | Settings::Publish { .. }
-                    | Settings::Outside(_),
-                    _,
-                ) => continue,
-            };
-            let inputs = if node.is_source() {
-                Vec::new()
-            } else {
-                self.inputs(input)
-            };
-            group.add(node, Ends::new(&stage.name, inputs))?;
-            streams.insert(index);
+                group.add(node, Ends::new(&stage.name, inputs))?;
+            }
         }
+        let Built {
+            streams,
+            findings,
+            files,
+            ..
+        } = built;
         let sinks: [(&str, Option<Box<dyn Sink + '_>>); 2] = [
             ("observer", Some(Box::new(&mut observer))),
             ("beside", beside),
@@ -253,6 +210,70 @@ impl<'a> Replay<'a> {
         drop(group);
         observer.observed.note(&findings.get());
         Ok(observer.observed.into_outcome(cell, stem, stages, files))
+    }
+
+    /// Creates the node of a stage, with its inputs; `None` for a stage that a replay leaves out.
+    fn node<'n>(
+        &self,
+        stage: &Stage,
+        (recording, out): (&Path, Option<&Path>),
+        built: &mut Built,
+    ) -> Result<Option<(Node<'n>, Vec<Input>)>, ReplayError> {
+        let cell = self.cell();
+        let input = stage.inputs.first();
+        let input = input.filter(|input| built.streams.contains(input)).copied();
+        let node = match (&stage.settings, input) {
+            (Settings::Ingest(config), _) => {
+                let opened = open::recording(config, recording, cell, self.reads_ahead)?;
+                built.findings = opened.1;
+                Node::source(Box::new(Commanded::archived(opened.0)))
+            }
+            (Settings::Twin { config, model }, Some(_)) => {
+                self.twin(config, model.as_ref(), recording)?
+            }
+            (Settings::Detect { config, model }, Some(behind)) => {
+                let shared = built.shared.entry(behind).or_default().clone();
+                let detect = build::detect(config, model.as_ref(), cell, Some(shared))?;
+                Node::stage(Box::new(detect))
+            }
+            (
+                Settings::Watch {
+                    config,
+                    model,
+                    effort_cutoff_hz,
+                },
+                Some(_),
+            ) => {
+                let watch = build::watch(config, model.as_ref(), *effort_cutoff_hz, cell)?;
+                Node::stage(Box::new(watch))
+            }
+            (Settings::Record(config), _) => {
+                let config = redirect(config, out, &stem(recording), &mut built.files);
+                let Some(config) = config else {
+                    return Ok(None);
+                };
+                let listened = stage.inputs.iter().copied();
+                let listened: Vec<usize> = listened
+                    .filter(|input| built.streams.contains(input))
+                    .collect();
+                let recorder = self.pipeline.recorder(&config, &listened)?;
+                let mut inputs = self.inputs(listened.iter().copied());
+                let names = listened.iter().map(|&index| self.name(index));
+                inputs.extend(names.map(Input::HealthOf));
+                return Ok(Some((Node::sink(Box::new(recorder)), inputs)));
+            }
+            (
+                Settings::Twin { .. }
+                | Settings::Detect { .. }
+                | Settings::Watch { .. }
+                | Settings::Publish { .. }
+                | Settings::Outside(_),
+                _,
+            ) => return Ok(None),
+        };
+        // A twin of the archive is a source.
+        let input = input.filter(|_| !node.is_source());
+        Ok(Some((node, self.inputs(input))))
     }
 
     fn plausible_twins(&self) -> BTreeMap<String, PlausibleTwin> {
@@ -315,26 +336,6 @@ impl<'a> Replay<'a> {
         })
     }
 
-    fn add_recorder(
-        &self,
-        group: &mut Group<'_>,
-        stage: &Stage,
-        config: &tauscope_record::Config,
-        streams: &BTreeSet<usize>,
-    ) -> Result<(), ReplayError> {
-        let listened = stage.inputs.iter().copied();
-        let listened: Vec<usize> = listened.filter(|input| streams.contains(input)).collect();
-        let recorder = self.pipeline.recorder(config, &listened)?;
-        let mut inputs = self.inputs(listened.iter().copied());
-        let names = listened.iter().map(|&index| self.name(index));
-        inputs.extend(names.map(Input::HealthOf));
-        group.add(
-            Node::sink(Box::new(recorder)),
-            Ends::new(&stage.name, inputs),
-        )?;
-        Ok(())
-    }
-
     /// Inputs for the streams of these stages.
     fn inputs(&self, stages: impl IntoIterator<Item = usize>) -> Vec<Input> {
         let names = stages.into_iter().map(|index| self.name(index));
@@ -344,6 +345,18 @@ impl<'a> Replay<'a> {
     fn name(&self, index: usize) -> String {
         self.pipeline.stages[index].name.clone()
     }
+}
+
+/// State of a replay while its nodes are created.
+#[derive(Default)]
+struct Built {
+    /// The stages whose streams are there.
+    streams: BTreeSet<usize>,
+    /// Values that detectors behind one twin share, because they process the same samples.
+    shared: BTreeMap<usize, tauscope_detect::Shared>,
+    /// Findings of the source.
+    findings: Findings,
+    files: Vec<PathBuf>,
 }
 
 /// A recording's name; see [`tauscope_archive::name_of`].

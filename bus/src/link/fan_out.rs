@@ -10,13 +10,19 @@ use crate::sample::Sample;
 /// Without links, samples are written and discarded.
 pub struct FanOut<T> {
     links: Vec<Box<dyn Sender<T>>>,
+    /// Receivers by link that have not taken the end, once that is known: a link that has given up counts once.
+    untaken: Vec<Option<usize>>,
     sent: u64,
 }
 
 impl<T: Sample> FanOut<T> {
     /// A sender over all of `links`.
     pub fn new(links: Vec<Box<dyn Sender<T>>>) -> Self {
-        Self { links, sent: 0 }
+        Self {
+            untaken: vec![None; links.len()],
+            links,
+            sent: 0,
+        }
     }
 }
 
@@ -59,14 +65,15 @@ impl<T: Sample> Sender<T> for FanOut<T> {
     }
 
     fn poll_taken(&mut self, timeout: Duration) -> Result<Poll<usize>, LinkError> {
-        let none = Poll::Ready(0);
-        self.links.iter_mut().try_fold(none, |all, link| {
-            let taken = link.poll_taken(timeout)?;
-            Ok(match (all, taken) {
-                (Poll::Ready(all), Poll::Ready(missing)) => Poll::Ready(all + missing),
-                _ => Poll::Pending,
-            })
-        })
+        for (link, untaken) in self.links.iter_mut().zip(&mut self.untaken) {
+            if untaken.is_none()
+                && let Poll::Ready(missing) = link.poll_taken(timeout)?
+            {
+                *untaken = Some(missing);
+            }
+        }
+        let all: Option<usize> = self.untaken.iter().copied().sum();
+        Ok(all.map_or(Poll::Pending, Poll::Ready))
     }
 
     fn counts(&self) -> SenderCounts {

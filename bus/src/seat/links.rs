@@ -275,11 +275,7 @@ fn check<T: Sample>(stream: &str, kind: SampleKind) -> Result<(), LinkError> {
     if kind == T::KIND {
         return Ok(());
     }
-    Err(LinkError::TypeMismatch {
-        stream: stream.to_owned(),
-        expected: T::KIND.type_name().to_owned(),
-        found: kind.type_name().to_owned(),
-    })
+    Err(LinkError::mismatch(stream, T::KIND, Some(kind)))
 }
 
 fn in_process(stream: &str) -> LinkError {

@@ -150,9 +150,7 @@ impl Child {
     pub fn stage<I: Sample, O: Sample>(self, stage: &mut dyn Stage<I, O>) -> ExitCode {
         let Self { seat, context } = &self;
         let node = Node::stage(Box::new(stage));
-        let ready = node
-            .check_seat(seat)
-            .and_then(|()| Ok(ends(seat, &Transports::default())?));
+        let ready = check_shape(&node, seat).and_then(|()| Ok(ends(seat, &Transports::default())?));
         let ran = ready.and_then(|ends| {
             let group = move |pulse| {
                 let mut group = Group::under(pulse);
@@ -223,6 +221,27 @@ where
         Ok(mut stage) => child.stage(&mut stage),
         Err(error) => child.fail(&error),
     }
+}
+
+/// Checks that a seat has the inputs and the output of a kind of node.
+pub(super) fn check_shape(node: &Node<'_>, seat: &Seat) -> Result<(), ChildError> {
+    let (inputs, output) = (seat.inputs.len(), seat.output.is_some());
+    let (fits, expected) = if node.is_source() {
+        (inputs == 0 && output, "no input and an output")
+    } else if node.is_sink() {
+        (inputs > 0 && !output, "inputs and no output")
+    } else {
+        (inputs == 1 && output, "one input and an output")
+    };
+    if fits {
+        return Ok(());
+    }
+    let output = if output { "an" } else { "no" };
+    Err(ChildError::Shape {
+        stage: seat.stage.clone(),
+        expected,
+        found: format!("{inputs} inputs and {output} output"),
+    })
 }
 
 /// Opens the senders of a seat, and prepares its receivers.

@@ -7,13 +7,16 @@
 //! A group does not wait and has no clock: [`Group::turn`] processes what is there and says when to call it again. A
 //! replay calls it in a loop; an [`EventLoop`](super::EventLoop) runs many groups against the clock of the machine.
 
+mod edge;
 mod inlet;
 mod member;
+mod next;
 mod node;
 mod outlet;
 mod turn;
+mod work;
 
-use std::cell::{RefCell, RefMut};
+use std::cell::RefMut;
 use std::os::fd::BorrowedFd;
 use std::rc::Rc;
 use std::task::{Poll, Waker};
@@ -23,23 +26,21 @@ use super::Ledger;
 use super::pulse::Pulse;
 use super::report::{Outcome, Report};
 use crate::link::{LinkError, Sender};
-use crate::sample::{Health, SampleKind};
-use crate::seat::{AnyReceiver, AnySender};
+use crate::sample::Health;
+use crate::seat::AnySender;
 use crate::stage::{Progress, StageError};
 
+pub use inlet::Opening;
+pub use next::Next;
 pub use node::Node;
 
+use edge::{Edge, Part, Shared};
 use inlet::Inlet;
-use member::Part;
-use outlet::Edge;
 use turn::Turn;
 
 /// Largest number of samples of one input that are processed in one turn of a group.
 /// Resolution: the delay of the other groups of the thread.
 const BATCH: usize = 64;
-
-/// Opens the receiving end of a link, once all receivers of the group are connected.
-pub type Opening = Box<dyn FnOnce() -> Result<Box<dyn AnyReceiver>, LinkError> + Send>;
 
 /// An input of a node.
 pub enum Input {
@@ -83,34 +84,6 @@ impl Ends {
         }
     }
 }
-
-/// When a group has something to do again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Next {
-    /// At once.
-    Now,
-    /// At this time.
-    At(Instant),
-    /// When one of its sources or links has samples again.
-    Woken,
-    /// Never: all its nodes have ended.
-    Over,
-}
-
-impl Next {
-    /// The earlier of two.
-    fn or(self, other: Self) -> Self {
-        match (self, other) {
-            (Self::Now, _) | (_, Self::Now) => Self::Now,
-            (Self::At(one), Self::At(other)) => Self::At(one.min(other)),
-            (Self::At(at), _) | (_, Self::At(at)) => Self::At(at),
-            (Self::Woken, _) | (_, Self::Woken) => Self::Woken,
-            (Self::Over, Self::Over) => Self::Over,
-        }
-    }
-}
-
-type Shared<'a> = Rc<RefCell<dyn Part<'a> + 'a>>;
 
 /// A stage group.
 #[derive(Default)]
@@ -326,15 +299,6 @@ fn source_turn<'a>(source: &mut (dyn Part<'a> + 'a), stopped: bool) -> Result<Ne
             Next::Over
         }
     })
-}
-
-fn mismatch(stage: &str, expected: SampleKind, found: Option<SampleKind>) -> LinkError {
-    let name = |kind: SampleKind| kind.type_name().to_owned();
-    LinkError::TypeMismatch {
-        stream: stage.to_owned(),
-        expected: name(expected),
-        found: found.map_or_else(|| "no stream".to_owned(), name),
-    }
 }
 
 /// Sets the outcomes of a group in which one stage has failed and the others end with it.

@@ -25,7 +25,7 @@ use std::task::{Poll, Waker};
 use std::thread::{Builder, JoinHandle};
 
 use super::child::{
-    ChildError, Line, REPORT_EVERY, ends, say, say_posted, say_ready, stop_on_signals,
+    ChildError, Line, REPORT_EVERY, check_shape, ends, say, say_posted, say_ready, stop_on_signals,
 };
 use super::event_loop::{EventLoop, Task, panic_message};
 use super::group::{Ends, Group, Node, set_failed};
@@ -124,7 +124,7 @@ where
                     let context = worker.note(&seats);
                     let builder = worker.clone();
                     // A stage may take long to build. Its loop runs other groups meanwhile.
-                    let build = move || builder.build(seats, context);
+                    let build = move || builder.build(&seats, context);
                     match Builder::new().name("build".to_owned()).spawn(build) {
                         Ok(thread) => building.push(thread),
                         Err(error) => {
@@ -199,14 +199,14 @@ impl Worker {
     }
 
     /// Creates the stages of a group, opens their senders, and gives the group to a loop.
-    fn build(&self, seats: Vec<Seat>, context: Context) {
-        let made = catch_unwind(AssertUnwindSafe(|| self.nodes(&seats)));
+    fn build(&self, seats: &[Seat], context: Context) {
+        let made = catch_unwind(AssertUnwindSafe(|| self.nodes(seats)));
         let first = seats.first().map_or("", |seat| &seat.stage).to_owned();
         let failed = match made {
-            Ok(Ok(nodes)) => match self.loop_for(&seats, &nodes) {
+            Ok(Ok(nodes)) => match self.loop_for(seats, &nodes) {
                 Ok(handle) => {
                     let LoopHandle { tasks, waker } = handle;
-                    let given = tasks.send(self.task(&seats, nodes, context));
+                    let given = tasks.send(self.task(seats, nodes, context));
                     debug_assert!(given.is_ok(), "a loop lives as long as its handle");
                     // The loop learns with the wake-up whether it is to expect more groups.
                     drop(tasks);
@@ -231,9 +231,7 @@ impl Worker {
     fn nodes(&self, seats: &[Seat]) -> Result<Vec<(Node<'static>, Ends)>, Unmade> {
         let nodes = (self.make)(seats)?.into_iter().zip(seats);
         let nodes = nodes.map(|(node, seat)| {
-            let ends = node
-                .check_seat(seat)
-                .and_then(|()| Ok(ends(seat, &self.transports)?));
+            let ends = check_shape(&node, seat).and_then(|()| Ok(ends(seat, &self.transports)?));
             let ends = ends.map_err(|error: ChildError| Unmade::new(&seat.stage, &error))?;
             Ok((node, ends))
         });

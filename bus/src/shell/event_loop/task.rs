@@ -18,7 +18,7 @@ use crate::stage::StageError;
 
 /// Interval at which a starting group looks for its receivers.
 /// Resolution: delay of the start.
-const CONNECT_EVERY: Duration = Duration::from_millis(5);
+const CONNECT_EVERY: Duration = Duration::from_millis(20);
 /// Interval of the reports of a group, and of its checks for a stop request.
 /// Resolution: the cost of reporting.
 const REPORT_EVERY: Duration = Duration::from_millis(100);

@@ -4,11 +4,14 @@ use std::os::fd::BorrowedFd;
 use std::task::Waker;
 use std::time::{Duration, Instant};
 
-use super::outlet::Edge;
-use super::{Next, Opening};
+use super::edge::Edge;
+use super::next::Next;
 use crate::link::{LinkError, MAX_DEPTH, Received};
 use crate::seat::AnyReceiver;
 use crate::stage::StageError;
+
+/// Opens the receiving end of a link, once all receivers of the group are connected.
+pub type Opening = Box<dyn FnOnce() -> Result<Box<dyn AnyReceiver>, LinkError> + Send>;
 
 pub(super) struct Inlet<'a> {
     edge: Edge<'a>,
@@ -70,7 +73,7 @@ impl<'a> Inlet<'a> {
         let Link::Open(receiver) = &mut self.link else {
             return Ok(Next::Over);
         };
-        let input = self.edge.input();
+        let input = self.edge.input;
         let mut to = self.edge.to();
         for _ in 0..most {
             let mut accepted = Ok(());

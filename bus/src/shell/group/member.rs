@@ -3,9 +3,10 @@
 use std::task::{Poll, Waker};
 use std::time::{Duration, Instant};
 
-use super::node::Work;
-use super::outlet::{Edge, Outlet};
-use super::{Turn, mismatch};
+use super::edge::{Edge, Part};
+use super::outlet::Outlet;
+use super::turn::Turn;
+use super::work::Work;
 use crate::link::{LinkError, Position, ReceiverCounts, Sender};
 use crate::sample::{Health, SampleKind, SampleRef};
 use crate::seat::AnySender;
@@ -18,7 +19,7 @@ use crate::stage::{Emit as _, Progress, StageError};
 /// Resolution: the delay of a sample, against the number of wake-ups.
 const IDLE: Duration = Duration::from_millis(1);
 
-/// What belongs to the stage of a node, in addition to its streams.
+/// Properties of the stage of a node, in addition to its streams.
 pub(super) struct Post {
     pub stage: String,
     pub restarts: u64,
@@ -26,56 +27,6 @@ pub(super) struct Post {
     pub inputs: Vec<String>,
     pub health: Option<Box<dyn Sender<Health>>>,
     pub ledger: Ledger,
-}
-
-/// A node in its group, independent of its sample types.
-pub(super) trait Part<'a> {
-    /// Adds a receiver of its stream.
-    fn attach(&mut self, edge: Edge<'a>) -> Result<(), LinkError>;
-
-    /// Adds a receiver of its health reports.
-    fn attach_health(&mut self, edge: Edge<'a>) -> Result<(), LinkError>;
-
-    /// See [`Source::register`](crate::Source::register).
-    fn register(&mut self, waker: &Waker);
-
-    /// Makes a step of a source.
-    fn step(&mut self) -> Result<Progress, StageError>;
-
-    /// Processes a sample of an input.
-    fn accept(&mut self, input: usize, sample: SampleRef<'_>) -> Result<(), LinkError>;
-
-    /// Sends a health report if one is due.
-    fn tell(&mut self) -> Result<(), LinkError>;
-
-    /// Takes over the counters of a link.
-    fn count_link(&mut self, input: usize, counts: ReceiverCounts, position: Option<Position>);
-
-    /// Closes an input, because its stream has `ended` or a stop was requested. Finishes with the last one.
-    fn close(&mut self, input: usize, ended: bool) -> Result<(), StageError>;
-
-    /// Marks it as stopped before the end of its inputs.
-    fn stop(&mut self);
-
-    /// Finishes the stage and ends its stream.
-    fn finish(&mut self) -> Result<(), StageError>;
-
-    /// See [`Group::maintain`](super::Group::maintain).
-    fn maintain(&mut self, now: Instant) -> Result<(), StageError>;
-
-    fn fraction_done(&self) -> Option<f64>;
-
-    /// Updates the report.
-    fn count(&mut self);
-
-    /// The report as of the last update.
-    fn report(&self) -> &Report;
-
-    /// Number of receivers over links that are not connected.
-    fn missing_receivers(&mut self) -> Result<usize, LinkError>;
-
-    /// See [`Sender::poll_taken`].
-    fn poll_taken(&mut self, timeout: Duration) -> Result<Poll<()>, LinkError>;
 }
 
 pub(super) struct Member<'a, W: Work> {
@@ -155,7 +106,7 @@ impl<'a, W: Work> Part<'a> for Member<'a, W> {
     fn attach(&mut self, edge: Edge<'a>) -> Result<(), LinkError> {
         let stage = &self.report.stage;
         if W::GIVES.is_none() {
-            return Err(mismatch(stage, SampleKind::Health, None));
+            return Err(LinkError::mismatch(stage, SampleKind::Health, None));
         }
         self.out.attach(stage, edge)
     }

@@ -1,45 +1,14 @@
 //! Output of a node: to the nodes of its group that receive it, and over links to all others.
 
-use std::cell::{RefCell, RefMut};
-use std::rc::Rc;
 use std::task::Poll;
 use std::time::Duration;
 
-use super::member::Part;
-use super::mismatch;
+use super::edge::Edge;
 use crate::link::{LinkError, Sender, SenderCounts};
-use crate::sample::{Header, Sample, SampleKind};
+use crate::sample::{Header, Sample};
 use crate::shell::Ledger;
 use crate::shell::pulse::Pulse;
 use crate::stage::{Emit, StageError};
-
-/// A connection to an input of a node of the same group.
-pub(super) struct Edge<'a> {
-    input: usize,
-    to: Rc<RefCell<dyn Part<'a> + 'a>>,
-    /// Kind that the node accepts; `None` for all.
-    accepts: Option<SampleKind>,
-}
-
-impl<'a> Edge<'a> {
-    pub fn new(
-        input: usize,
-        to: Rc<RefCell<dyn Part<'a> + 'a>>,
-        accepts: Option<SampleKind>,
-    ) -> Self {
-        Self { input, to, accepts }
-    }
-
-    /// Index of the input.
-    pub fn input(&self) -> usize {
-        self.input
-    }
-
-    /// The node. The nodes of a group form no cycle, so none is borrowed twice.
-    pub fn to(&self) -> RefMut<'_, dyn Part<'a> + 'a> {
-        self.to.borrow_mut()
-    }
-}
 
 pub(super) struct Outlet<'a, T: Sample> {
     edges: Vec<Edge<'a>>,
@@ -50,6 +19,8 @@ pub(super) struct Outlet<'a, T: Sample> {
     newest: Option<Header>,
     ledger: Ledger,
     pulse: Pulse,
+    /// Receivers over the link that have not taken the end, once that is known.
+    untaken: Option<usize>,
 }
 
 impl<'a, T: Sample> Outlet<'a, T> {
@@ -62,13 +33,14 @@ impl<'a, T: Sample> Outlet<'a, T> {
             newest: None,
             ledger,
             pulse,
+            untaken: None,
         }
     }
 
     /// Adds a receiver of this group to the stream of `stage`.
     pub fn attach(&mut self, stage: &str, edge: Edge<'a>) -> Result<(), LinkError> {
         if let Some(kind) = edge.accepts.filter(|kind| *kind != T::KIND) {
-            return Err(mismatch(stage, kind, Some(T::KIND)));
+            return Err(LinkError::mismatch(stage, kind, Some(T::KIND)));
         }
         match edge.accepts {
             Some(_) => self.edges.push(edge),
@@ -96,8 +68,16 @@ impl<'a, T: Sample> Outlet<'a, T> {
     }
 
     pub fn poll_taken(&mut self, timeout: Duration) -> Result<Poll<usize>, LinkError> {
-        let link = self.link.as_mut();
-        link.map_or(Ok(Poll::Ready(0)), |link| link.poll_taken(timeout))
+        if self.untaken.is_none() {
+            self.untaken = match self.link.as_mut().map(|link| link.poll_taken(timeout)) {
+                Some(polled) => match polled? {
+                    Poll::Ready(missing) => Some(missing),
+                    Poll::Pending => None,
+                },
+                None => Some(0),
+            };
+        }
+        Ok(self.untaken.map_or(Poll::Pending, Poll::Ready))
     }
 
     /// Ends the stream for all receivers.
@@ -120,6 +100,7 @@ impl<T: Sample> Emit<T> for Outlet<'_, T> {
             newest,
             ledger,
             pulse,
+            ..
         } = self;
         if let (Some(link), true) = (&mut *link, edges.is_empty()) {
             pulse.waiting(|| {
