@@ -56,7 +56,9 @@ impl Magnitudes {
             self.zeros += 1;
             return;
         }
-        let exponent = value.abs().max(f64::MIN_POSITIVE).log2().floor() as i32;
+        // The exponent of the floating-point format is the floor of the binary logarithm.
+        let bits = value.abs().max(f64::MIN_POSITIVE).to_bits();
+        let exponent = (bits >> (f64::MANTISSA_DIGITS - 1)) as i32 - (f64::MAX_EXP - 1);
         let bin = (exponent + Self::OFFSET).clamp(0, Self::BINS as i32 - 1);
         self.counts[bin as usize] = self.counts[bin as usize].saturating_add(1);
     }
