@@ -14,8 +14,8 @@ pub mod child;
 mod event_loop;
 pub mod group;
 mod health;
+mod heartbeat;
 mod ledger;
-mod pulse;
 mod report;
 mod worker;
 
@@ -78,8 +78,8 @@ impl Context {
 /// # Errors
 /// If the system has no more descriptors. The failure of a stage is in its report.
 pub fn run(context: &Context, nodes: Vec<(Node<'_>, Ends)>) -> std::io::Result<Vec<Report>> {
-    let group = move |pulse| {
-        let mut group = Group::under(pulse);
+    let group = move |heartbeat| {
+        let mut group = Group::under(heartbeat);
         for (node, ends) in nodes {
             group.add(node, ends)?;
         }

@@ -34,7 +34,7 @@ pub struct Local {
     deaths: Deaths,
     /// Restart policy; that of a group is at its root.
     policy: Option<Restart>,
-    pulse: Pulse,
+    heartbeat: Heartbeat,
     /// Whether this is the last incarnation.
     last_life: bool,
     /// Whether this incarnation is ready.
@@ -57,7 +57,7 @@ pub struct Local {
 
 /// Heartbeat of this incarnation.
 #[derive(Debug, Default)]
-struct Pulse {
+struct Heartbeat {
     /// Time of the last heartbeat.
     heard: Option<Instant>,
     /// Whether its process has reported since then that this stage blocks its thread.
@@ -93,7 +93,7 @@ impl Local {
             state: State::Waiting(now),
             deaths: Deaths::default(),
             policy: None,
-            pulse: Pulse::default(),
+            heartbeat: Heartbeat::default(),
             last_life: false,
             ready: false,
             flow: Flow::new(now.into_std()),
@@ -141,7 +141,7 @@ impl Local {
         self.state = State::Running;
         self.ready = false;
         self.holds.clear();
-        self.pulse = Pulse::default();
+        self.heartbeat = Heartbeat::default();
         self.patience = None;
     }
 
@@ -193,14 +193,14 @@ impl Local {
                 return Reported::Holds;
             }
             Ok(Line::Stuck { .. }) => {
-                self.pulse.stuck = true;
+                self.heartbeat.stuck = true;
                 return Reported::Stuck;
             }
             Err(_) => return Reported::Other(line),
         }
         let now = Instant::now();
-        self.pulse.heard = Some(now);
-        self.pulse.stuck = false;
+        self.heartbeat.heard = Some(now);
+        self.heartbeat.stuck = false;
         let moved = self.flow.note(self.samples(), now.into_std());
         if let Some(patience) = self.patience.as_mut().filter(|_| moved) {
             patience.extend(now);
@@ -273,7 +273,7 @@ impl Local {
     /// first heartbeat of an incarnation: the stage waits for others, or sends none.
     pub fn unheard_for(&self, now: Instant) -> Option<Duration> {
         let heard = self
-            .pulse
+            .heartbeat
             .heard
             .filter(|_| self.is_running() && !self.is_done());
         heard.map(|heard| now.duration_since(heard))
@@ -281,17 +281,17 @@ impl Local {
 
     /// Returns whether it blocks its thread, as its process reports.
     pub fn is_stuck(&self) -> bool {
-        self.pulse.stuck
+        self.heartbeat.stuck
     }
 
     /// Sets whether it is hung; returns whether that has changed.
     pub fn note_hangs(&mut self, hangs: bool) -> bool {
-        std::mem::replace(&mut self.pulse.hangs, hangs) != hangs
+        std::mem::replace(&mut self.heartbeat.hangs, hangs) != hangs
     }
 
     /// Returns whether it was last noted as hung.
     pub fn hangs(&self) -> bool {
-        self.pulse.hangs
+        self.heartbeat.hangs
     }
 
     /// Notes its normal end.

@@ -152,8 +152,8 @@ impl Child {
         let node = Node::stage(Box::new(stage));
         let ready = check_shape(&node, seat).and_then(|()| Ok(ends(seat, &Transports::default())?));
         let ran = ready.and_then(|ends| {
-            let group = move |pulse| {
-                let mut group = Group::under(pulse);
+            let group = move |heartbeat| {
+                let mut group = Group::under(heartbeat);
                 group.add(node, ends)?;
                 Ok(group)
             };

@@ -21,7 +21,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, epoll, poll};
 
 use super::Context;
 use super::group::Group;
-use super::pulse::Pulse;
+use super::heartbeat::Heartbeat;
 use super::report::{Outcome, Report};
 use crate::link::LinkError;
 
@@ -45,7 +45,7 @@ pub struct EventLoop<'a> {
     notifier: Arc<Notifier>,
     /// Waker for a new task.
     arrival: Arc<TaskWaker>,
-    pulse: Pulse,
+    heartbeat: Heartbeat,
     tasks: Vec<Running<'a>>,
     events: Vec<epoll::Event>,
     tokens: u64,
@@ -67,7 +67,7 @@ impl<'a> EventLoop<'a> {
             epoll,
             arrival: TaskWaker::new(&notifier),
             notifier,
-            pulse: Pulse::default(),
+            heartbeat: Heartbeat::default(),
             tasks: Vec::new(),
             events: Vec::with_capacity(EVENTS),
             tokens: 0,
@@ -107,7 +107,7 @@ impl<'a> EventLoop<'a> {
     fn start(&mut self, task: Task<'a>) {
         self.tokens += 1;
         let waker = TaskWaker::new(&self.notifier);
-        if let Some(task) = Running::start(task, self.tokens, waker, &self.pulse) {
+        if let Some(task) = Running::start(task, self.tokens, waker, &self.heartbeat) {
             self.tasks.push(task);
         }
     }
@@ -196,7 +196,7 @@ pub(super) fn run<'a>(
     context: &Context,
     within: Duration,
     ready: fn(&str, usize),
-    group: impl FnOnce(Pulse) -> Result<Group<'a>, LinkError> + Send + 'a,
+    group: impl FnOnce(Heartbeat) -> Result<Group<'a>, LinkError> + Send + 'a,
 ) -> io::Result<Vec<Report>> {
     let (ended, reports) = mpsc::channel();
     let mut task = Some(Task {

@@ -23,7 +23,7 @@ use std::task::{Poll, Waker};
 use std::time::{Duration, Instant};
 
 use super::Ledger;
-use super::pulse::Pulse;
+use super::heartbeat::Heartbeat;
 use super::report::{Outcome, Report};
 use crate::link::{LinkError, Sender};
 use crate::sample::Health;
@@ -98,9 +98,9 @@ pub struct Group<'a> {
 
 impl<'a> Group<'a> {
     /// A group whose nodes run under this heartbeat.
-    pub(super) fn under(pulse: Pulse) -> Self {
+    pub(super) fn under(heartbeat: Heartbeat) -> Self {
         Self {
-            turn: Turn::under(pulse),
+            turn: Turn::under(heartbeat),
             ..Self::default()
         }
     }
@@ -273,8 +273,8 @@ impl<'a> Group<'a> {
         Ok(all)
     }
 
-    pub(super) fn pulse(&self) -> Pulse {
-        self.turn.pulse()
+    pub(super) fn heartbeat(&self) -> Heartbeat {
+        self.turn.heartbeat()
     }
 
     /// Name of the node that runs, or that has panicked.

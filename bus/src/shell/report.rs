@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use crate::link::{Position, ReceiverCounts, SenderCounts};
-use crate::shell::pulse::Pulse;
+use crate::shell::heartbeat::Heartbeat;
 use crate::stage::StageError;
 use crate::trouble::Trouble;
 
@@ -139,7 +139,7 @@ pub struct Board(Arc<Mutex<Posted>>);
 struct Posted {
     reports: Vec<Report>,
     at: Option<Instant>,
-    pulse: Option<Pulse>,
+    heartbeat: Option<Heartbeat>,
     ends: bool,
 }
 
@@ -157,22 +157,22 @@ impl Board {
     pub fn stuck(&self, now: Instant) -> Option<(String, Duration)> {
         let posted = self.lock();
         let silent_for = now.saturating_duration_since(posted.at?);
-        let waits = posted.pulse.as_ref().is_some_and(Pulse::waits);
+        let waits = posted.heartbeat.as_ref().is_some_and(Heartbeat::waits);
         let over = posted.reports.iter().any(|report| report.outcome.is_some());
         if silent_for < Self::STUCK_AFTER || waits || over || posted.ends {
             return None;
         }
         // Without a heartbeat there is one stage.
-        let stage = match &posted.pulse {
-            Some(pulse) => pulse.current_stage(),
+        let stage = match &posted.heartbeat {
+            Some(heartbeat) => heartbeat.current_stage(),
             None => posted.reports.first()?.stage.clone(),
         };
         Some((stage, silent_for))
     }
 
     /// Sets the heartbeat that names the current stage.
-    pub(super) fn follow(&self, pulse: Pulse) {
-        self.lock().pulse = Some(pulse);
+    pub(super) fn follow(&self, heartbeat: Heartbeat) {
+        self.lock().heartbeat = Some(heartbeat);
     }
 
     /// Disables the hang detection: the end of a stage may take long, and those who wait for it have a timeout.

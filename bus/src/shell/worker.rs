@@ -246,8 +246,8 @@ impl Worker {
     ) -> Task<'static> {
         let (worker, first) = (self.clone(), context.stage.clone());
         Task {
-            group: Box::new(move |pulse| {
-                let mut group = Group::under(pulse);
+            group: Box::new(move |heartbeat| {
+                let mut group = Group::under(heartbeat);
                 for (node, ends) in nodes {
                     group.add(node, ends)?;
                 }

@@ -11,7 +11,7 @@ use rustix::event::epoll;
 use super::waker::TaskWaker;
 use crate::link::{LinkError, POLL_TAKEN_EVERY};
 use crate::shell::group::{Group, Next, set_failed};
-use crate::shell::pulse::Pulse;
+use crate::shell::heartbeat::Heartbeat;
 use crate::shell::report::{Outcome, Report};
 use crate::shell::{Context, TAKEN_WITHIN};
 use crate::stage::StageError;
@@ -29,7 +29,7 @@ const TURNS: usize = 16;
 /// A group that a loop is to run.
 pub(in crate::shell) struct Task<'a> {
     /// The group, not opened yet.
-    pub group: Box<dyn FnOnce(Pulse) -> Result<Group<'a>, LinkError> + Send + 'a>,
+    pub group: Box<dyn FnOnce(Heartbeat) -> Result<Group<'a>, LinkError> + Send + 'a>,
     /// Stop request, status board, name of the first stage.
     pub context: Context,
     /// Longest wait for receivers, after which the group starts without them.
@@ -78,7 +78,12 @@ pub(super) struct TurnResult {
 
 impl<'a> Running<'a> {
     /// Builds the group; `None` if its nodes do not fit each other.
-    pub fn start(task: Task<'a>, token: u64, waker: Arc<TaskWaker>, pulse: &Pulse) -> Option<Self> {
+    pub fn start(
+        task: Task<'a>,
+        token: u64,
+        waker: Arc<TaskWaker>,
+        heartbeat: &Heartbeat,
+    ) -> Option<Self> {
         let Task {
             group,
             context,
@@ -86,7 +91,7 @@ impl<'a> Running<'a> {
             ready,
             done,
         } = task;
-        let group = match group(pulse.clone()) {
+        let group = match group(heartbeat.clone()) {
             Ok(group) => group,
             Err(error) => {
                 done(vec![Report {
@@ -157,7 +162,7 @@ impl<'a> Running<'a> {
             }
             has_descriptors = self.open(epoll)?;
             self.phase = Phase::Running;
-            self.context.board.follow(self.group.pulse());
+            self.context.board.follow(self.group.heartbeat());
             self.context.board.post(&self.group.reports());
         }
         if matches!(self.phase, Phase::Running) {

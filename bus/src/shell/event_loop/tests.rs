@@ -62,8 +62,8 @@ fn run_all(ends: &[End], length: u64) -> (Vec<Report>, Vec<Vec<Instant>>) {
         };
         let (context, reports) = (Context::new(&name), Arc::clone(&reports));
         tasks.push_back(Task {
-            group: Box::new(move |pulse| {
-                let mut group = Group::under(pulse);
+            group: Box::new(move |heartbeat| {
+                let mut group = Group::under(heartbeat);
                 group.add(Node::source(Box::new(source)), Ends::new(&name, vec![]))?;
                 Ok(group)
             }),

@@ -62,13 +62,13 @@ impl<W: Work> Member<'_, W> {
             ..InputReport::default()
         });
         let inputs: Vec<InputReport> = inputs.collect();
-        let pulse = turn.pulse();
+        let heartbeat = turn.heartbeat();
         Ok(Self {
             place: turn.place(&post.stage),
             turn: turn.clone(),
             work,
-            out: Outlet::new(output.transpose()?, post.ledger.clone(), pulse.clone()),
-            health: Outlet::new(post.health, Ledger::default(), pulse),
+            out: Outlet::new(output.transpose()?, post.ledger.clone(), heartbeat.clone()),
+            health: Outlet::new(post.health, Ledger::default(), heartbeat),
             clock: HealthClock::new(&post.stage, post.restarts),
             due: false,
             wakes: false,

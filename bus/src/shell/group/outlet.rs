@@ -7,7 +7,7 @@ use super::edge::Edge;
 use crate::link::{LinkError, Sender, SenderCounts};
 use crate::sample::{Header, Sample};
 use crate::shell::Ledger;
-use crate::shell::pulse::Pulse;
+use crate::shell::heartbeat::Heartbeat;
 use crate::stage::{Emit, StageError};
 
 pub(super) struct Outlet<'a, T: Sample> {
@@ -18,13 +18,13 @@ pub(super) struct Outlet<'a, T: Sample> {
     sent: u64,
     newest: Option<Header>,
     ledger: Ledger,
-    pulse: Pulse,
+    heartbeat: Heartbeat,
     /// Receivers over the link that have not taken the end, once that is known.
     untaken: Option<usize>,
 }
 
 impl<'a, T: Sample> Outlet<'a, T> {
-    pub fn new(link: Option<Box<dyn Sender<T>>>, ledger: Ledger, pulse: Pulse) -> Self {
+    pub fn new(link: Option<Box<dyn Sender<T>>>, ledger: Ledger, heartbeat: Heartbeat) -> Self {
         Self {
             edges: Vec::new(),
             link,
@@ -32,7 +32,7 @@ impl<'a, T: Sample> Outlet<'a, T> {
             sent: 0,
             newest: None,
             ledger,
-            pulse,
+            heartbeat,
             untaken: None,
         }
     }
@@ -99,11 +99,11 @@ impl<T: Sample> Emit<T> for Outlet<'_, T> {
             sent,
             newest,
             ledger,
-            pulse,
+            heartbeat,
             ..
         } = self;
         if let (Some(link), true) = (&mut *link, edges.is_empty()) {
-            pulse.waiting(|| {
+            heartbeat.waiting(|| {
                 link.send_with(&mut |place| {
                     write(place);
                     *newest = Some(*place.header());
@@ -126,7 +126,7 @@ impl<T: Sample> Emit<T> for Outlet<'_, T> {
             to.tell()
         });
         if let Some(link) = link {
-            pulse.waiting(|| link.send_with(&mut |place| *place = *slot))?;
+            heartbeat.waiting(|| link.send_with(&mut |place| *place = *slot))?;
         }
         heard
     }

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use crate::link::LinkError;
-use crate::shell::pulse::Pulse;
+use crate::shell::heartbeat::Heartbeat;
 use crate::stage::StageError;
 
 /// State shared by the stages of one group, which run in one thread.
@@ -14,27 +14,27 @@ pub struct Turn(Rc<State>);
 #[derive(Debug, Default)]
 struct State {
     /// Stays at a stage that has panicked.
-    pulse: Pulse,
+    heartbeat: Heartbeat,
     failure: RefCell<Option<(usize, StageError)>>,
 }
 
 impl Turn {
     /// The state of a group whose thread has this heartbeat.
-    pub(super) fn under(pulse: Pulse) -> Self {
+    pub(super) fn under(heartbeat: Heartbeat) -> Self {
         Self(Rc::new(State {
-            pulse,
+            heartbeat,
             ..State::default()
         }))
     }
 
     /// Registers a stage, and returns its index.
     pub(super) fn place(&self, name: &str) -> usize {
-        self.0.pulse.place(name)
+        self.0.heartbeat.place(name)
     }
 
     /// The heartbeat, for other threads.
-    pub(super) fn pulse(&self) -> Pulse {
-        self.0.pulse.clone()
+    pub(super) fn heartbeat(&self) -> Heartbeat {
+        self.0.heartbeat.clone()
     }
 
     /// Runs the work of the stage at `place`, possibly nested in the work of the preceding stage.
@@ -43,7 +43,7 @@ impl Turn {
         place: usize,
         work: impl FnOnce() -> Result<(), StageError>,
     ) -> Result<(), LinkError> {
-        let result = self.0.pulse.turn_of(place, work);
+        let result = self.0.heartbeat.turn_of(place, work);
         result.map_err(|error| {
             // Preceding stages pass the failure on; the original error is kept.
             let mut failure = self.0.failure.borrow_mut();
@@ -57,7 +57,7 @@ impl Turn {
 
     /// Name of the current stage.
     pub(super) fn current_stage(&self) -> String {
-        self.0.pulse.current_stage()
+        self.0.heartbeat.current_stage()
     }
 
     /// Fails if a stage has failed, even if the preceding stages did not pass the failure on.
@@ -80,6 +80,6 @@ impl Turn {
     }
 
     fn name(&self, place: usize) -> String {
-        self.0.pulse.name(place)
+        self.0.heartbeat.name(place)
     }
 }

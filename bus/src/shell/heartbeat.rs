@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Heartbeat of a thread that runs stages. Clones share it.
 #[derive(Debug, Clone, Default)]
-pub struct Pulse(Arc<Beat>);
+pub struct Heartbeat(Arc<Beat>);
 
 #[derive(Debug, Default)]
 struct Beat {
@@ -14,7 +14,7 @@ struct Beat {
     waits: AtomicBool,
 }
 
-impl Pulse {
+impl Heartbeat {
     /// Name of the current stage.
     pub fn current_stage(&self) -> String {
         self.name(self.0.at.load(Ordering::Relaxed))
