@@ -5,7 +5,8 @@
 //! depends on the inputs only.
 //!
 //! A group does not wait and has no clock: [`Group::turn`] processes what is there and says when to call it again. A
-//! replay calls it in a loop; an [`EventLoop`](super::EventLoop) runs many groups against the clock of the machine.
+//! replay calls it in a loop; [`run`](super::run) and a [`worker`](super::worker) run groups against the clock of the
+//! machine.
 
 mod edge;
 mod inlet;
