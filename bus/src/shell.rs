@@ -25,11 +25,15 @@ pub use ledger::{Account, Ledger};
 pub use report::{Board, InputReport, Outcome, Report};
 pub use worker::{Unmade, worker};
 
+/// Interval of the reports of a running stage, and of its checks for a stop request; the work of a killed stage since
+/// its last report is unknown.
+/// Resolution: the cost of reporting.
+const REPORT_EVERY: Duration = Duration::from_millis(100);
 /// Longest time that a terminating stage waits, without progress, for receivers that have not read all of its stream.
 /// Resolution: duration of a shutdown.
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
 
-/// Stop request to a shell. Clones share it.
+/// Stop request to a stage group. Clones share it.
 #[derive(Debug, Clone, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
@@ -39,7 +43,7 @@ impl Stop {
         Self::default()
     }
 
-    /// Requests a stop: the shell processes the samples that have arrived, completes its output and returns.
+    /// Requests a stop: the group processes the samples that have arrived, completes its output and returns.
     pub fn stop(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
@@ -50,21 +54,19 @@ impl Stop {
     }
 }
 
-/// Context of a shell, in addition to the stage and its links.
+/// Context of a stage group, in addition to its nodes and links.
 #[derive(Debug, Clone, Default)]
 pub struct Context {
-    /// Name of the stage.
+    /// Name of its first stage.
     pub stage: String,
-    /// Number of restarts of the stage.
-    pub restarts: u64,
     /// Stop request.
     pub stop: Stop,
-    /// Status board for the stage's reports.
+    /// Status board for the reports of its stages.
     pub board: Board,
 }
 
 impl Context {
-    /// Context of the stage of that name, without restarts.
+    /// Context of a group whose first stage has this name.
     pub fn new(stage: &str) -> Self {
         Self {
             stage: stage.to_owned(),
@@ -78,12 +80,5 @@ impl Context {
 /// # Errors
 /// If the system has no more descriptors. The failure of a stage is in its report.
 pub fn run(context: &Context, nodes: Vec<(Node<'_>, Ends)>) -> std::io::Result<Vec<Report>> {
-    let group = move |heartbeat| {
-        let mut group = Group::under(heartbeat);
-        for (node, ends) in nodes {
-            group.add(node, ends)?;
-        }
-        Ok(group)
-    };
-    event_loop::run(context, Duration::ZERO, |_, _| {}, group)
+    event_loop::run(context, Duration::ZERO, |_, _| {}, nodes)
 }

@@ -18,23 +18,19 @@ use std::error::Error;
 use std::io::{self, BufRead as _, Write as _};
 use std::process::ExitCode;
 use std::sync::mpsc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 use tokio::signal::unix::{SignalKind, signal};
 
 use super::event_loop;
-use super::group::{Ends, Group, Input, Node};
+use super::group::{Ends, Input, Node};
 use super::report::text_of;
-use super::{Board, Context, Ledger, Outcome, Report, Stop};
+use super::{Board, Context, Ledger, Outcome, REPORT_EVERY, Report, Stop};
 use crate::link::LinkError;
 use crate::sample::{Sample, SampleKind};
 use crate::seat::{Links, Seat, TransportKind, Transports};
 use crate::stage::Stage;
-
-/// Reporting interval of a running stage; the work of a killed stage since its last report is unknown.
-/// Resolution: the cost of reporting.
-pub(super) const REPORT_EVERY: Duration = Duration::from_millis(100);
 
 /// A line of a stage's process on standard output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -134,7 +130,6 @@ impl Child {
         stop_on_signals(move || stopped.stop()).map_err(ChildError::Signals)?;
         let context = Context {
             stage: seat.stage.clone(),
-            restarts: seat.restarts,
             stop,
             ..Context::default()
         };
@@ -152,13 +147,8 @@ impl Child {
         let node = Node::stage(Box::new(stage));
         let ready = check_shape(&node, seat).and_then(|()| Ok(ends(seat, &Transports::default())?));
         let ran = ready.and_then(|ends| {
-            let group = move |heartbeat| {
-                let mut group = Group::under(heartbeat);
-                group.add(node, ends)?;
-                Ok(group)
-            };
             let within = seat.start_within();
-            let run = || event_loop::run(context, within, say_ready, group);
+            let run = || event_loop::run(context, within, say_ready, vec![(node, ends)]);
             reporting(&context.board, run).map_err(ChildError::System)
         });
         match ran {

@@ -20,10 +20,9 @@ use std::time::{Duration, Instant};
 use rustix::event::{PollFd, PollFlags, Timespec, epoll, poll};
 
 use super::Context;
-use super::group::Group;
+use super::group::{Ends, Node};
 use super::heartbeat::Heartbeat;
 use super::report::{Outcome, Report};
-use crate::link::LinkError;
 
 pub(super) use task::Task;
 
@@ -192,15 +191,15 @@ impl<'a> EventLoop<'a> {
 ///
 /// # Errors
 /// If the system has no more descriptors.
-pub(super) fn run<'a>(
+pub(super) fn run(
     context: &Context,
     within: Duration,
     ready: fn(&str, usize),
-    group: impl FnOnce(Heartbeat) -> Result<Group<'a>, LinkError> + Send + 'a,
+    nodes: Vec<(Node<'_>, Ends)>,
 ) -> io::Result<Vec<Report>> {
     let (ended, reports) = mpsc::channel();
     let mut task = Some(Task {
-        group: Box::new(group),
+        nodes,
         context: context.clone(),
         within,
         ready,

@@ -25,13 +25,12 @@ use std::task::{Poll, Waker};
 use std::thread::{Builder, JoinHandle};
 
 use super::child::{
-    ChildError, Line, REPORT_EVERY, check_shape, ends, say, say_posted, say_ready, stop_on_signals,
+    ChildError, Line, check_shape, ends, say, say_posted, say_ready, stop_on_signals,
 };
 use super::event_loop::{EventLoop, Task, panic_message};
-use super::group::{Ends, Group, Node, set_failed};
+use super::group::{Ends, Node, set_failed};
 use super::report::text_of;
-use super::{Board, Context, Outcome, Report, Stop};
-use crate::link::LinkError;
+use super::{Board, Context, Outcome, REPORT_EVERY, Report, Stop};
 use crate::seat::{Seat, Transports};
 
 /// Largest number of groups that wait for their loop.
@@ -190,7 +189,6 @@ impl Worker {
         };
         let context = Context {
             stage: alive.stages.first().cloned().unwrap_or_default(),
-            restarts: seats.first().map_or(0, |seat| seat.restarts),
             stop: alive.stop.clone(),
             board: alive.board.clone(),
         };
@@ -246,13 +244,7 @@ impl Worker {
     ) -> Task<'static> {
         let (worker, first) = (self.clone(), context.stage.clone());
         Task {
-            group: Box::new(move |heartbeat| {
-                let mut group = Group::under(heartbeat);
-                for (node, ends) in nodes {
-                    group.add(node, ends)?;
-                }
-                Ok::<_, LinkError>(group)
-            }),
+            nodes,
             context,
             within: (seats.iter().map(Seat::start_within))
                 .max()

@@ -9,27 +9,24 @@ use std::time::{Duration, Instant};
 use rustix::event::epoll;
 
 use super::waker::TaskWaker;
-use crate::link::{LinkError, POLL_TAKEN_EVERY};
-use crate::shell::group::{Group, Next, set_failed};
+use crate::link::POLL_TAKEN_EVERY;
+use crate::shell::group::{Ends, Group, Next, Node, set_failed};
 use crate::shell::heartbeat::Heartbeat;
 use crate::shell::report::{Outcome, Report};
-use crate::shell::{Context, TAKEN_WITHIN};
+use crate::shell::{Context, REPORT_EVERY, TAKEN_WITHIN};
 use crate::stage::StageError;
 
 /// Interval at which a starting group looks for its receivers.
 /// Resolution: delay of the start.
 const CONNECT_EVERY: Duration = Duration::from_millis(20);
-/// Interval of the reports of a group, and of its checks for a stop request.
-/// Resolution: the cost of reporting.
-const REPORT_EVERY: Duration = Duration::from_millis(100);
 /// Largest number of turns of a group before the other groups have theirs.
 /// Resolution: the delay of the other groups, against the cost of a round.
 const TURNS: usize = 16;
 
 /// A group that a loop is to run.
 pub(in crate::shell) struct Task<'a> {
-    /// The group, not opened yet.
-    pub group: Box<dyn FnOnce(Heartbeat) -> Result<Group<'a>, LinkError> + Send + 'a>,
+    /// The nodes of the group, each behind its inputs.
+    pub nodes: Vec<(Node<'a>, Ends)>,
     /// Stop request, status board, name of the first stage.
     pub context: Context,
     /// Longest wait for receivers, after which the group starts without them.
@@ -85,23 +82,27 @@ impl<'a> Running<'a> {
         heartbeat: &Heartbeat,
     ) -> Option<Self> {
         let Task {
-            group,
+            nodes,
             context,
             within,
             ready,
             done,
         } = task;
-        let group = match group(heartbeat.clone()) {
-            Ok(group) => group,
-            Err(error) => {
-                done(vec![Report {
-                    stage: context.stage,
-                    outcome: Some(Outcome::of(&error.into())),
-                    ..Report::default()
-                }]);
+        let stages = nodes.iter().map(|(_, ends)| Report {
+            stage: ends.stage.clone(),
+            ..Report::default()
+        });
+        let mut reports: Vec<Report> = stages.collect();
+        let mut group = Group::under(heartbeat.clone());
+        for (node, ends) in nodes {
+            let stage = ends.stage.clone();
+            if let Err(error) = group.add(node, ends) {
+                set_failed(&mut reports, &stage, &Outcome::of(&error.into()));
+                context.board.post(&reports);
+                done(reports);
                 return None;
             }
-        };
+        }
         let now = Instant::now();
         Some(Self {
             token,

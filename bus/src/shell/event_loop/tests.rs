@@ -62,11 +62,7 @@ fn run_all(ends: &[End], length: u64) -> (Vec<Report>, Vec<Vec<Instant>>) {
         };
         let (context, reports) = (Context::new(&name), Arc::clone(&reports));
         tasks.push_back(Task {
-            group: Box::new(move |heartbeat| {
-                let mut group = Group::under(heartbeat);
-                group.add(Node::source(Box::new(source)), Ends::new(&name, vec![]))?;
-                Ok(group)
-            }),
+            nodes: vec![(Node::source(Box::new(source)), Ends::new(&name, vec![]))],
             context,
             within: Duration::ZERO,
             ready: |_, _| {},
