@@ -3,7 +3,6 @@
 //!
 //! [`answer`] runs a command as a function; [`answer_alone`] does so for a process that does nothing else.
 
-mod announce;
 mod cli;
 mod commands;
 mod doctor;

@@ -5,7 +5,7 @@ mod table;
 
 use serde::Serialize;
 use tauscope_bus::{Keep, SampleKind};
-use tauscope_pipeline::pipeline::{Pipeline, Role, Stage};
+use tauscope_pipeline::pipeline::{Pipeline, Placement, Stage};
 
 pub use picture::{dot, mermaid};
 pub use table::{keep_word, table};
@@ -56,7 +56,7 @@ pub fn links(pipeline: &Pipeline) -> Vec<Link> {
     for (to, stage) in pipeline.stages.iter().enumerate() {
         for &from in &stage.inputs {
             let maker = &pipeline.stages[from];
-            let Some(carries) = maker.role.gives() else {
+            let Some(carries) = maker.role.gives else {
                 continue;
             };
             let over = over(maker, stage);
@@ -77,9 +77,10 @@ pub fn links(pipeline: &Pipeline) -> Vec<Link> {
 /// Returns the transport between two stages. Within a process, the sender calls the receiver directly, unless the
 /// receiver may skip samples or may wait for a disk or a network.
 fn over(maker: &Stage, listener: &Stage) -> Over {
-    let is_called = matches!(listener.role, Role::Twin | Role::Detect | Role::Watch)
+    let placement = |stage: &Stage| stage.role.kind.placement;
+    let is_called = placement(listener) == Placement::WithCell
         && listener.keep == Keep::All
-        && !matches!(maker.role, Role::Outside(_));
+        && placement(maker) != Placement::Program;
     match (
         maker.host == listener.host,
         maker.process == listener.process,

@@ -37,7 +37,6 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::mpsc;
 use tokio::time::Instant;
 
-use crate::announce;
 use crate::plan::{Link, Over};
 use local::Local;
 use process::Event;
@@ -46,7 +45,8 @@ use router::Router;
 pub use seats::Instructions;
 use service::Service;
 pub use summary::{Ended, Summary};
-use tauscope_pipeline::pipeline::{Pipeline, Role};
+use tauscope_pipeline::announce;
+use tauscope_pipeline::pipeline::Pipeline;
 pub use view::Verbosity;
 use view::View;
 use worker::Worker;
@@ -335,7 +335,8 @@ impl Supervisor<'_> {
     }
 
     fn is_recorder(&self, index: usize) -> bool {
-        self.pipeline.stages[self.stages[index].at].role == Role::Record
+        let stage = &self.pipeline.stages[self.stages[index].at];
+        stage.role.kind.is::<tauscope_record::Config>()
     }
 
     fn alarm(&mut self) {

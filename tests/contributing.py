@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Follows CONTRIBUTING.md literally, in a copy of the tree.
 
-    python3 tests/contributing.py [--keep] [--only detector|term|source|stage]
+    python3 tests/contributing.py [--keep] [--only detector|term|source|kind|stage]
 
 Each worked example must build, work in a run, and touch exactly the files that it names. The copy stands in
 target/contributing, and its builds go to the tree's own target folder, so that dependencies are not built again.
@@ -20,7 +20,8 @@ EXAMPLES = {
     "detector": "### Adding a detector",
     "term": "### Adding a physics term",
     "source": "### Adding a source",
-    "stage": "### Adding a stage",
+    "kind": "### Adding a kind of stage",
+    "stage": "### Adding an external stage",
 }
 BLOCK = re.compile(r"^`([^`\n]+)`(, edit)?\n\n```\w+\n(.*?)^```$", re.S | re.M)
 SHELL = re.compile(r"^```sh\n(.*?)^```$", re.S | re.M)
@@ -149,6 +150,22 @@ def source(tree, tauscope):
     expect(made["ingest"] == 500 and made["twin"] == 500, "500 samples go through a pipeline")
 
 
+def kind(tree, tauscope):
+    run(tree, "cargo", "test", "--quiet", "--offline", "-p", "tauscope-pipeline", "--test", "stages")
+    print("  it keeps the promises of all stages")
+    more = "  - {name: thin, input: ingest, thin: {every: 4}}\n  - {name: slow, input: thin, twin: {}}\n"
+    text = PIPELINE.format(source=DEMO, more=more, inputs=", thin, slow")
+    write(tree, "thin.yaml", text)
+    said = json.loads(run(tree, tauscope, "run", "--json", "thin.yaml"))
+    os.remove(os.path.join(tree, "thin.yaml"))
+    made = {stage["stage"]: stage["emitted"] for stage in said["stages"]}
+    expect(made["slow"] == made["thin"] == -(-made["ingest"] // 4) > 0, f"a twin gets {made['thin']} of {made['ingest']}")
+    write(tree, "out/thin.yaml", text.replace("tests/", "../tests/"))
+    said = run(tree, tauscope, "replay", "--json", "--pipeline", "out/thin.yaml", "tests/data/demo.mcap", "--out", "out/t")
+    counts = {stage["stage"]: stage["emitted"] for stage in json.loads(said)[0]["stages"]}
+    expect(counts["slow"] == made["slow"], "and as many in a replay")
+
+
 def stage(tree, tauscope):
     more = "  - name: standing\n    input: ingest\n    outside: {command: [COMMAND], output: detection}\n"
     more = more.replace("COMMAND", os.path.join(ROOT, "target/debug/standing-stage"))
@@ -187,7 +204,7 @@ def main():
     # The copy's program, kept from the next build of the tree itself.
     tauscope = os.path.join(tree, "out/tauscope")
     shutil.copy2(os.path.join(ROOT, "target/debug/tauscope"), tauscope)
-    checks = {"detector": detector, "term": term, "source": source, "stage": stage}
+    checks = {"detector": detector, "term": term, "source": source, "kind": kind, "stage": stage}
     for name in examples:
         print(f"{name}:")
         checks[name](tree, tauscope)
@@ -196,6 +213,8 @@ def main():
     wanted = set().union(*named.values())
     if "stage" in named:
         wanted.add("examples/standing-stage/Cargo.lock")
+    if "kind" in named:
+        wanted.add("Cargo.lock")
     expect(touched == wanted, f"{len(touched)} files are touched, those that are named")
     if asked.keep:
         print(tree)

@@ -1,25 +1,13 @@
-//! Builds stages from their settings, in the same way for `run`, `replay` and the check. The check builds every twin
-//! and detector to validate its settings.
+//! Builds twins, detectors and watches from their settings, in the same way for `run`, `replay`, `calibrate`,
+//! `evaluate` and the check, which builds each of them to validate its settings.
 
 use std::collections::BTreeMap;
-use std::task::Waker;
-use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
-use tauscope_bus::{
-    Emit, JointState, LinkError, Progress, SampleKind, Source, StageError, Trouble, ZenohEndpoints,
-};
 use tauscope_detect::Detect;
-use tauscope_dynamics::{Link, Model};
-use tauscope_ingest::{Commanded, IngestError, Paced, Rate, SimulatedRobot, Takes};
-use tauscope_publish::{PublishError, Publisher};
-use tauscope_record::{CellInfo, RecordError, Recorder, StreamInfo};
 use tauscope_twin::{Correction, Expected, Twin, TwinFile};
 use tauscope_watch::{self as watch, Watch};
 
 use crate::cell::{Cell, EffortUnit};
-use crate::provenance::sha256;
-use crate::settings::BesidePublisher;
 use crate::trained;
 
 /// Error while building a stage.
@@ -56,110 +44,6 @@ pub fn ingest_setup(cell: &Cell) -> tauscope_ingest::Setup {
                 inertia_kgm2: tool.inertia_kgm2,
             }),
         has_tool_link: cell.tool_link().is_some(),
-    }
-}
-
-/// Adds commands to a source of `cell`: live ones from the endpoints of its configuration, otherwise those of the
-/// archive. Requests to learn are accepted if `somebody_learns`.
-///
-/// # Errors
-/// If the command endpoints cannot be opened.
-pub fn commanded(
-    source: Box<dyn Source<JointState>>,
-    config: &tauscope_ingest::Config,
-    cell: &Cell,
-    somebody_learns: bool,
-) -> Result<Commanded, LinkError> {
-    match &config.commands {
-        Some(endpoints) => {
-            let links = cell.model.as_ref().map(Model::links);
-            let arm_kg = links.map(|links| links.iter().map(Link::mass_kg).sum::<f64>());
-            let takes = Takes {
-                learn: somebody_learns,
-                arm_kg: arm_kg.filter(|kg| *kg > 0.0),
-            };
-            Commanded::live(source, &ingest_setup(cell), endpoints, takes)
-        }
-        None => Ok(Commanded::archived(source)),
-    }
-}
-
-/// Opens the source of `cell`. A restarted source that reads a file continues after the sample with the stamp
-/// `after_ns`.
-///
-/// # Errors
-/// If the source cannot be opened; [`IngestError::is_input`] separates input errors from failures.
-pub fn ingest(
-    config: &tauscope_ingest::Config,
-    robot: Option<&SimulatedRobot>,
-    cell: &Cell,
-    after_ns: Option<i64>,
-) -> Result<Box<dyn Source<JointState>>, IngestError> {
-    let setup = ingest_setup(cell);
-    // A live source cannot repeat past samples.
-    let (_, source) = config.source()?;
-    let Some(after_ns) = after_ns.filter(|_| source.file().is_some()) else {
-        return tauscope_ingest::open(config, &setup, robot);
-    };
-    // Samples emitted before the restart are skipped at full speed; pacing starts after them.
-    let fast = tauscope_ingest::Config {
-        rate: Rate::Fast,
-        ..config.clone()
-    };
-    let rest = After {
-        inner: tauscope_ingest::open(&fast, &setup, robot)?,
-        after_ns,
-    };
-    Ok(match config.rate.factor() {
-        Some(factor) => Box::new(Paced::new(rest, factor)),
-        None => Box::new(rest),
-    })
-}
-
-/// A source that skips the samples up to a stamp.
-struct After {
-    inner: Box<dyn Source<JointState>>,
-    after_ns: i64,
-}
-
-struct EmitAfter<'a> {
-    out: &'a mut dyn Emit<JointState>,
-    after_ns: i64,
-}
-
-impl Emit<JointState> for EmitAfter<'_> {
-    fn emit(&mut self, write: &mut dyn FnMut(&mut JointState)) -> Result<(), LinkError> {
-        let mut sample = JointState::default();
-        write(&mut sample);
-        if sample.header.stamp_ns <= self.after_ns {
-            return Ok(());
-        }
-        self.out.emit(&mut |slot| *slot = sample)
-    }
-}
-
-impl Source<JointState> for After {
-    fn step(&mut self, out: &mut dyn Emit<JointState>) -> Result<Progress, StageError> {
-        self.inner.step(&mut EmitAfter {
-            out,
-            after_ns: self.after_ns,
-        })
-    }
-
-    fn register(&mut self, waker: &Waker) -> bool {
-        self.inner.register(waker)
-    }
-
-    fn dropped(&self) -> u64 {
-        self.inner.dropped()
-    }
-
-    fn fraction_done(&self) -> Option<f64> {
-        self.inner.fraction_done()
-    }
-
-    fn trouble(&mut self, silent_for: Duration) -> Option<Trouble> {
-        self.inner.trouble(silent_for)
     }
 }
 
@@ -295,103 +179,4 @@ pub fn watch(
         effort_cutoff_hz: cutoffs.map(|own| own.unwrap_or(effort_cutoff_hz)).collect(),
     };
     Ok(Watch::new(config, &setup))
-}
-
-/// Properties of a stream that a recorder needs.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct StreamFacts {
-    /// The stage that emits it.
-    pub stage: String,
-    /// Its cell.
-    pub cell: String,
-    /// Sample type.
-    pub kind: SampleKind,
-    /// The detector, if it is a built-in one.
-    pub detector: Option<String>,
-    /// Whether its detections, if it emits any, are contacts.
-    pub judges_contact: bool,
-}
-
-/// Builds a recorder of `streams`, which belong to `cells`.
-///
-/// # Errors
-/// If cells, streams and file names are inconsistent, or a file cannot be created.
-pub fn recorder(
-    config: &tauscope_record::Config,
-    cells: &[&Cell],
-    streams: &[StreamFacts],
-    provenance: &BTreeMap<String, String>,
-) -> Result<Recorder, RecordError> {
-    let units = |name: &str| {
-        let cell = cells.iter().find(|cell| cell.facts.name == name);
-        cell.map(|cell| cell.facts.effort_unit).unwrap_or_default()
-    };
-    let infos: Vec<CellInfo> = cells
-        .iter()
-        .map(|cell| CellInfo {
-            name: cell.facts.name.clone(),
-            joint_names: cell.facts.joint_names.clone(),
-            model: cell.model.clone(),
-            effort_unit: cell.facts.effort_unit.as_str().to_owned(),
-        })
-        .collect();
-    let streams: Vec<StreamInfo> = streams
-        .iter()
-        .map(|stream| StreamInfo {
-            stage: stream.stage.clone(),
-            cell: stream.cell.clone(),
-            kind: stream.kind,
-            detector: stream.detector.clone(),
-            score_unit: score_unit(stream, units(&stream.cell)).to_owned(),
-        })
-        .collect();
-    Recorder::new(config, &infos, &streams, provenance)
-}
-
-/// Unit of the scores in a stream; empty if it has no scores or their unit is unknown.
-fn score_unit(stream: &StreamFacts, effort: EffortUnit) -> &'static str {
-    let entry = stream
-        .detector
-        .as_deref()
-        .and_then(tauscope_detect::Entry::find);
-    entry.map_or("", |entry| entry.score_unit.in_words(effort))
-}
-
-/// Builds a publisher of `streams` of one cell. `restarted` is set after its first start.
-///
-/// # Errors
-/// If a network endpoint cannot be opened.
-pub fn publisher(
-    config: &tauscope_publish::Config,
-    commands: Option<&ZenohEndpoints>,
-    beside: &BesidePublisher,
-    cell: &Cell,
-    streams: &[StreamFacts],
-    restarted: bool,
-) -> Result<Publisher, PublishError> {
-    let streams = streams.iter().map(|stream| tauscope_publish::StreamInfo {
-        stage: stream.stage.clone(),
-        kind: stream.kind,
-        detector: stream.detector.clone(),
-        judges_contact: stream.judges_contact,
-    });
-    let urdf = cell.facts.urdf.as_ref();
-    let joints = cell.facts.joint_names.iter();
-    let calibrated = joints.map(|name| beside.calibrated.get(name).copied());
-    let setup = tauscope_publish::Setup {
-        cell: cell.facts.name.clone(),
-        joint_names: cell.facts.joint_names.clone(),
-        model: cell.model.clone(),
-        streams: streams.collect(),
-        commands: commands.cloned(),
-        facts: tauscope_publish::Facts {
-            effort_unit: cell.facts.effort_unit.as_str().to_owned(),
-            urdf_sha256: urdf.map(|urdf| sha256(urdf.as_bytes())),
-            twin_sha256: beside.twin_sha256.clone(),
-            calibrated: calibrated.collect(),
-            archive: beside.archive.clone(),
-        },
-        restarted,
-    };
-    Publisher::new(config, &setup)
 }

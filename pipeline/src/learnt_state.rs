@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, SyncSender};
 use std::thread::JoinHandle;
 
+use tauscope_bus::shell;
 use tauscope_bus::{Detection, Emit, Stage, StageError, TwinState};
 use tauscope_detect::{Config, Detect, State, StateFile};
 use tauscope_watch::{Memory, Watch};
@@ -153,6 +154,18 @@ impl<S: Learns> Stage<TwinState, Detection> for Kept<S> {
 
     fn dropped(&self) -> u64 {
         self.stage.dropped()
+    }
+}
+
+/// Reports that a stage restarted this often has lost what it had learnt, if no state was saved.
+pub fn tell_what_is_lost(stage: &str, restarts: u64, kept: Option<&Path>) {
+    if restarts > 0 && kept.is_none_or(|path| !path.exists()) {
+        let how = match kept {
+            Some(_) => "nothing was kept yet",
+            None => "`state: FILE` keeps it",
+        };
+        let lost = format!("started again: what it had learnt is lost; {how}");
+        shell::note(stage, &lost);
     }
 }
 

@@ -4,6 +4,7 @@
     allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")
 )]
 
+pub mod announce;
 pub mod build;
 pub mod calibrate;
 pub mod cell;
@@ -18,7 +19,6 @@ pub mod replay;
 pub mod report;
 pub mod results;
 pub mod scenario;
-pub mod settings;
 pub mod tables;
 pub mod tally;
 pub mod trained;

@@ -1,11 +1,13 @@
 //! The pipeline: its file, checked and with all names resolved.
 
 mod cells;
-mod entries;
 mod file;
+mod format;
+mod outputs;
 mod recorded;
 mod restart;
-mod role;
+mod stage;
+pub mod stages;
 mod wiring;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,26 +15,23 @@ use std::path::{Path, PathBuf};
 
 use tauscope_bus::{Keep, Wake};
 
-pub use file::{HostEntry, KeepEntry, PipelineFile, WakeEntry};
+pub use file::{HostEntry, PipelineFile};
 pub use restart::{Restart, When};
-pub use role::{ROLE_KEYS, Role, words_for};
+pub use stage::entry::{KeepEntry, StageEntry, WakeEntry};
+pub use stage::role::{Placement, Role, words_for};
+pub use stage::site::{LiveSite, NodeError, ReplaySite, StreamFacts};
+pub use stage::{Kind, Settings, StageConfig, StageSettings};
+pub use stages::STAGES;
 
-use file::{StageEntry, stage_place};
-use role::FORMER_WATCH_KEY;
+use stage::check::{Check, Purpose, Spot};
+use stage::entry::stage_place;
+use wiring::Wiring;
 
 use crate::cell::Cell;
+use crate::parallel;
 use crate::report::{Problem, Report};
-use crate::scenario::ScenarioFacts;
-use crate::settings::Settings;
 use crate::suggest;
 use crate::yaml::{self, Located};
-
-/// Poll interval of recorders and publishers for new samples \[ms\].
-/// Resolution: latency of the live picture, against wake-ups of the machine.
-const LOOKS_MS: u64 = 10;
-/// Smallest number of polls of a publisher within its stop timeout.
-/// Resolution: a single late poll must not cause a stop, against wake-ups of the machine.
-const LOOKS_WITHIN_STOP: u64 = 8;
 
 /// A pipeline that passed all checks before its start.
 #[derive(Debug)]
@@ -47,8 +46,6 @@ pub struct Pipeline {
     pub hosts: BTreeMap<String, HostEntry>,
     /// The stages, each after its inputs.
     pub stages: Vec<Stage>,
-    /// SHA-256 of the file that each twin's `model` names, by stage.
-    pub model_sha256: BTreeMap<String, String>,
     /// Edits that replace former keys of the file, which are still accepted.
     pub former_keys: Vec<String>,
 }
@@ -58,7 +55,7 @@ pub struct Pipeline {
 pub struct Stage {
     /// Its name.
     pub name: String,
-    /// Kind of the stage.
+    /// Its kind and sample types.
     pub role: Role,
     /// The host it runs on, if the file names hosts.
     pub host: Option<String>,
@@ -76,8 +73,6 @@ pub struct Stage {
     pub restart: Restart,
     /// Its settings, with paths resolved and files read.
     pub settings: Settings,
-    /// Scenario of a simulated source.
-    pub scenario: Option<ScenarioFacts>,
 }
 
 impl Stage {
@@ -111,12 +106,13 @@ impl Pipeline {
         let examined = yaml::examine::<PipelineFile>(path)?;
         let file = &examined.file;
         let mut report = Report::default();
-        let wiring = wiring::check(file, &mut report);
+        let kinds: Vec<&str> = STAGES.iter().map(|kind| kind.key).collect();
+        let wiring = wiring::check(file, &kinds, &mut report);
         let cells = cells::resolve(file, &mut report);
         if let Purpose::Run { host: Some(host) } = purpose {
             check_host(&file.value, host, &mut report);
         }
-        let mut files = entries::resolve(file, purpose, &cells, wiring.as_ref(), &mut report);
+        let mut settings = check_stages(file, purpose, &cells, wiring.as_ref(), &mut report);
         let file = examined.into_sound(report)?;
         let Some(wiring) = wiring else {
             return Err(Problem::of_file(path, "the stages make no pipeline").into());
@@ -127,7 +123,7 @@ impl Pipeline {
         }
         let mut stages = Vec::new();
         for &index in &wiring.order {
-            let Some(settings) = files.settings[index].take() else {
+            let Some(settings) = settings[index].take() else {
                 continue;
             };
             let entry = &file.value.stages[index];
@@ -143,22 +139,19 @@ impl Pipeline {
                     .collect(),
                 keep: match entry.keep {
                     Some(KeepEntry::Newest) => Keep::Newest,
-                    // A publisher must not delay the stages before it.
-                    None if wiring.roles[index] == Role::Publish => Keep::Newest,
-                    Some(KeepEntry::All) | None => Keep::All,
+                    Some(KeepEntry::All) => Keep::All,
+                    None => wiring.roles[index].kind.keep,
                 },
                 wake: match entry.wake {
                     Some(WakeEntry::Spin) => Wake::Spin,
                     Some(WakeEntry::Event) => Wake::Event,
-                    None => wake(&settings),
+                    None => settings.wake(),
                 },
                 restart: entry.restart.map_or_else(Restart::default, Restart::from),
                 settings,
-                scenario: files.scenarios.remove(&index),
             });
         }
         let text = file.text().to_owned();
-        let model_sha256 = files.model_sha256;
         let former_keys = former_keys(&file);
         Ok(Self {
             path: path.to_owned(),
@@ -166,49 +159,66 @@ impl Pipeline {
             cells,
             hosts: file.value.hosts,
             stages,
-            model_sha256,
             former_keys,
         })
     }
 }
 
+/// Checks all stages, and that their outputs are distinct; returns the settings by stage, in the order of the file.
+fn check_stages(
+    file: &Located<PipelineFile>,
+    purpose: Purpose<'_>,
+    cells: &BTreeMap<String, Cell>,
+    wiring: Option<&Wiring>,
+    report: &mut Report,
+) -> Vec<Option<Settings>> {
+    let count = file.value.stages.len();
+    let mut check = Check {
+        file,
+        purpose,
+        cells,
+        wiring,
+        settings: vec![None; count],
+        report,
+        slow: Vec::new(),
+    };
+    let mut order = wiring.map_or_else(|| (0..count).collect(), |wiring| wiring.order.clone());
+    // Those without an output last: a publisher tells of twins that are not among its inputs.
+    order.sort_by_key(|&index| wiring.is_some_and(|wiring| wiring.roles[index].gives.is_none()));
+    for index in order {
+        if let Some(part) = check.entry(index).parts.first() {
+            let place = stage_place(index).key(part.key);
+            check.settings[index] = part.config.check(&mut check, &Spot { index, place });
+        }
+    }
+    outputs::check(&mut check);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let slow = std::mem::take(&mut check.slow);
+    let problems = parallel::map(cores, slow, |check| check());
+    problems
+        .into_iter()
+        .flatten()
+        .for_each(|problem| check.push(problem));
+    check.settings
+}
+
 /// Edits that replace former keys, each with its line.
 fn former_keys(file: &Located<PipelineFile>) -> Vec<String> {
-    let stages = file.value.stages.iter().enumerate();
-    let is_former = |(_, entry): &(usize, &StageEntry)| entry.explain.is_some();
-    let edit = |(index, entry): (usize, &StageEntry)| {
-        let key = file.key_span(&stage_place(index).key(FORMER_WATCH_KEY));
-        let line = file.text()[..key.start].matches('\n').count() + 1;
-        let name = &entry.name;
-        format!(
-            "line {line}: `{FORMER_WATCH_KEY}` is the former key of a watch; in stage `{name}` write `watch:` instead of `{FORMER_WATCH_KEY}:`"
-        )
-    };
-    stages.filter(is_former).map(edit).collect()
-}
-
-/// Default wake-up of a stage.
-fn wake(settings: &Settings) -> Wake {
-    match settings {
-        // The latency of a recorder does not matter.
-        Settings::Record(_) => Wake::EveryMs(LOOKS_MS),
-        // The latency of a publisher matters for alarms only. Its polls must be frequent enough that a late one is
-        // not mistaken for silence of the detectors.
-        Settings::Publish { config, .. } => {
-            let often = (config.stop_after_s * 1e3) as u64 / LOOKS_WITHIN_STOP;
-            Wake::EveryMsOrUrgent(often.clamp(1, LOOKS_MS))
+    let mut edits = Vec::new();
+    for (index, entry) in file.value.stages.iter().enumerate() {
+        for part in &entry.parts {
+            let (former, now) = (part.key, part.config.role().kind.key);
+            if former != now {
+                let key = file.key_span(&stage_place(index).key(former));
+                let line = file.text()[..key.start].matches('\n').count() + 1;
+                let name = &entry.name;
+                edits.push(format!(
+                    "line {line}: `{former}` is the former key of a {now}; in stage `{name}` write `{now}:` instead of `{former}:`"
+                ));
+            }
         }
-        _ => Wake::Event,
     }
-}
-
-/// Purpose for which a pipeline is loaded.
-#[derive(Debug, Clone, Copy)]
-enum Purpose<'a> {
-    /// Run on this host; on all hosts if `None`.
-    Run { host: Option<&'a str> },
-    /// Replay of recordings in place of its sources.
-    Replay,
+    edits
 }
 
 fn check_host(file: &PipelineFile, host: &str, report: &mut Report) {

@@ -3,8 +3,6 @@
 
 mod error;
 mod observe;
-mod open;
-mod redirect;
 mod run;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,17 +10,15 @@ use std::path::{Path, PathBuf};
 
 use tauscope_bus::Sink;
 use tauscope_bus::shell::{Ends, Group, Input, Node};
-use tauscope_ingest::{ArchivedTwin, Commanded, Findings};
-use tauscope_twin::TwinFile;
+use tauscope_ingest::Findings;
 
-use crate::build;
 use crate::cell::Cell;
-use crate::pipeline::{Pipeline, Stage};
+use crate::pipeline::stages::ingest::IngestSettings;
+use crate::pipeline::stages::record::redirect;
+use crate::pipeline::stages::twin::TwinSettings;
+use crate::pipeline::{Pipeline, Placement, ReplaySite, Stage};
 use crate::plausible::PlausibleTwin;
-use crate::settings::Settings;
 use crate::tally::{DetectionTally, TwinTally};
-
-use redirect::redirect;
 
 pub use error::ReplayError;
 pub use observe::Observer;
@@ -72,8 +68,8 @@ pub struct Outcome {
 #[derive(Debug)]
 pub struct Replay<'a> {
     pipeline: &'a Pipeline,
-    /// The source that the recordings replace.
-    source: &'a Stage,
+    /// The source that the recordings replace, and its settings.
+    source: (&'a Stage, &'a IngestSettings),
     /// Indices of the source and of its downstream stages in the pipeline.
     members: Vec<usize>,
     twin: TwinChoice,
@@ -90,27 +86,26 @@ impl<'a> Replay<'a> {
         source: Option<&str>,
         twin: TwinChoice,
     ) -> Result<Self, ReplayError> {
-        let is_source = |stage: &&Stage| matches!(stage.settings, Settings::Ingest(_));
-        let sources: Vec<&Stage> = pipeline.stages.iter().filter(is_source).collect();
-        let names = || {
-            sources
-                .iter()
-                .map(|stage| stage.name.clone())
-                .collect::<Vec<_>>()
+        let stages = pipeline.stages.iter();
+        let sources = stages.filter_map(|stage| Some((stage, stage.settings.get()?)));
+        let sources: Vec<(&Stage, &IngestSettings)> = sources.collect();
+        let names = || -> Vec<String> {
+            let names = sources.iter().map(|(stage, _)| stage.name.clone());
+            names.collect()
         };
         let source = match (source, &sources[..]) {
             (_, []) => return Err(ReplayError::NoSource),
             (None, [only]) => *only,
             (None, _) => return Err(ReplayError::ManySources { stages: names() }),
             (Some(name), _) => {
-                let found = sources.iter().find(|stage| stage.name == name);
+                let found = sources.iter().find(|(stage, _)| stage.name == name);
                 *found.ok_or_else(|| ReplayError::UnknownSource {
                     name: name.to_owned(),
                     known: names().join(", "),
                 })?
             }
         };
-        let members = members(pipeline, source);
+        let members = members(pipeline, source.0);
         Ok(Self {
             pipeline,
             source,
@@ -130,7 +125,7 @@ impl<'a> Replay<'a> {
     /// External programs, which a replay leaves out although they depend on its source. Stages that listen only to
     /// them are left out, too.
     pub fn left_out(&self) -> Vec<&'a str> {
-        let outside = |stage: &&Stage| matches!(stage.settings, Settings::Outside(_));
+        let outside = |stage: &&Stage| stage.role.kind.placement == Placement::Program;
         self.pipeline
             .stages
             .iter()
@@ -178,22 +173,50 @@ impl<'a> Replay<'a> {
         let stem = stem(recording);
         let mut observer = Observer::new(cell, self.plausible_twins());
         let mut group = Group::default();
-        let mut built = Built::default();
+        let mut streams = BTreeSet::new();
+        let (mut findings, mut files) = (Findings::default(), Vec::new());
+        // By twin.
+        let mut shared: BTreeMap<usize, tauscope_detect::Shared> = BTreeMap::new();
         for &index in &self.members {
             let stage = &self.pipeline.stages[index];
-            if let Some((node, inputs)) = self.node(stage, (recording, out), &mut built)? {
-                if !node.is_sink() {
-                    built.streams.insert(index);
-                }
-                group.add(node, Ends::new(&stage.name, inputs))?;
+            let listened = stage.inputs.iter().copied();
+            let listened: Vec<usize> = listened.filter(|input| streams.contains(input)).collect();
+            let is_source = stage.name == self.source.0.name;
+            if listened.is_empty() && stage.role.gives.is_some() && !is_source {
+                continue;
             }
+            let behind = listened.first().copied().unwrap_or(index);
+            let facts = self.pipeline.streams(&listened);
+            let mut site = ReplaySite {
+                cell,
+                recording,
+                out,
+                source: &self.source.1.config,
+                keeps_twin: self.twin == TwinChoice::Keep,
+                reads_ahead: self.reads_ahead,
+                cells: self.pipeline.cells_of(&facts),
+                streams: facts,
+                provenance: self.pipeline.provenance(),
+                shared: shared.entry(behind).or_default().clone(),
+                findings: &mut findings,
+                files: &mut files,
+            };
+            let Some(node) = stage.settings.replayed(&mut site)? else {
+                continue;
+            };
+            let mut inputs = Vec::new();
+            // A twin of the archive is a source.
+            if !node.is_source() {
+                inputs.extend(self.inputs(listened.iter().copied()));
+            }
+            if stage.role.kind.hears_health {
+                inputs.extend(listened.iter().map(|&at| Input::HealthOf(self.name(at))));
+            }
+            if !node.is_sink() {
+                streams.insert(index);
+            }
+            group.add(node, Ends::new(&stage.name, inputs))?;
         }
-        let Built {
-            streams,
-            findings,
-            files,
-            ..
-        } = built;
         let sinks: [(&str, Option<Box<dyn Sink + '_>>); 2] = [
             ("observer", Some(Box::new(&mut observer))),
             ("beside", beside),
@@ -212,76 +235,10 @@ impl<'a> Replay<'a> {
         Ok(observer.observed.into_outcome(cell, stem, stages, files))
     }
 
-    /// Creates the node of a stage, with its inputs; `None` for a stage that a replay leaves out.
-    fn node<'n>(
-        &self,
-        stage: &Stage,
-        (recording, out): (&Path, Option<&Path>),
-        built: &mut Built,
-    ) -> Result<Option<(Node<'n>, Vec<Input>)>, ReplayError> {
-        let cell = self.cell();
-        let input = stage.inputs.first();
-        let input = input.filter(|input| built.streams.contains(input)).copied();
-        let node = match (&stage.settings, input) {
-            (Settings::Ingest(config), _) => {
-                let opened = open::recording(config, recording, cell, self.reads_ahead)?;
-                built.findings = opened.1;
-                Node::source(Box::new(Commanded::archived(opened.0)))
-            }
-            (Settings::Twin { config, model }, Some(_)) => {
-                self.twin(config, model.as_ref(), recording)?
-            }
-            (Settings::Detect { config, model }, Some(behind)) => {
-                let shared = built.shared.entry(behind).or_default().clone();
-                let detect = build::detect(config, model.as_ref(), cell, Some(shared))?;
-                Node::stage(Box::new(detect))
-            }
-            (
-                Settings::Watch {
-                    config,
-                    model,
-                    effort_cutoff_hz,
-                },
-                Some(_),
-            ) => {
-                let watch = build::watch(config, model.as_ref(), *effort_cutoff_hz, cell)?;
-                Node::stage(Box::new(watch))
-            }
-            (Settings::Record(config), _) => {
-                let config = redirect(config, out, &stem(recording), &mut built.files);
-                let Some(config) = config else {
-                    return Ok(None);
-                };
-                let listened = stage.inputs.iter().copied();
-                let listened: Vec<usize> = listened
-                    .filter(|input| built.streams.contains(input))
-                    .collect();
-                let recorder = self.pipeline.recorder(&config, &listened)?;
-                let mut inputs = self.inputs(listened.iter().copied());
-                let names = listened.iter().map(|&index| self.name(index));
-                inputs.extend(names.map(Input::HealthOf));
-                return Ok(Some((Node::sink(Box::new(recorder)), inputs)));
-            }
-            (
-                Settings::Twin { .. }
-                | Settings::Detect { .. }
-                | Settings::Watch { .. }
-                | Settings::Publish { .. }
-                | Settings::Outside(_),
-                _,
-            ) => return Ok(None),
-        };
-        // A twin of the archive is a source.
-        let input = input.filter(|_| !node.is_source());
-        Ok(Some((node, self.inputs(input))))
-    }
-
     fn plausible_twins(&self) -> BTreeMap<String, PlausibleTwin> {
         let stages = self.members.iter().map(|&at| &self.pipeline.stages[at]);
         let twins = stages.filter_map(|stage| {
-            let Settings::Twin { config, model } = &stage.settings else {
-                return None;
-            };
+            let TwinSettings { config, model, .. } = stage.settings.get()?;
             let twin = PlausibleTwin::new(config, model.as_ref(), self.cell());
             Some((stage.name.clone(), twin))
         });
@@ -292,8 +249,8 @@ impl<'a> Replay<'a> {
     pub fn files(&self, recording: &Path, out: &Path) -> Vec<PathBuf> {
         let mut files = Vec::new();
         for &index in &self.members {
-            if let Settings::Record(config) = &self.pipeline.stages[index].settings {
-                redirect(config, Some(out), &stem(recording), &mut files);
+            if let Some(config) = self.pipeline.stages[index].settings.get() {
+                redirect(config, Some(out), recording, &mut files);
             }
         }
         files
@@ -305,35 +262,8 @@ impl<'a> Replay<'a> {
     }
 
     fn cell(&self) -> &'a Cell {
-        let name = self.source.cells.first().map_or("", String::as_str);
+        let name = self.source.0.cells.first().map_or("", String::as_str);
         &self.pipeline.cells[name]
-    }
-
-    fn open_twin(&self, recording: &Path) -> Result<ArchivedTwin, ReplayError> {
-        let Settings::Ingest(config) = &self.source.settings else {
-            return Err(ReplayError::NoSource);
-        };
-        let topics = tauscope_ingest::ArchivedTwinTopics {
-            state: open::file_config(config, recording).topics.state,
-            ..Default::default()
-        };
-        let setup = build::ingest_setup(self.cell());
-        Ok(ArchivedTwin::open(recording, &topics, config, &setup)?)
-    }
-
-    /// The twin, recomputed or as in the recording.
-    fn twin<'n>(
-        &self,
-        config: &tauscope_twin::Config,
-        model: Option<&TwinFile>,
-        recording: &Path,
-    ) -> Result<Node<'n>, ReplayError> {
-        Ok(match self.twin {
-            TwinChoice::Recompute => {
-                Node::stage(Box::new(build::twin(config, model, self.cell())?))
-            }
-            TwinChoice::Keep => Node::source(Box::new(self.open_twin(recording)?)),
-        })
     }
 
     /// Inputs for the streams of these stages.
@@ -347,18 +277,6 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// State of a replay while its nodes are created.
-#[derive(Default)]
-struct Built {
-    /// The stages whose streams are there.
-    streams: BTreeSet<usize>,
-    /// Values that detectors behind one twin share, because they process the same samples.
-    shared: BTreeMap<usize, tauscope_detect::Shared>,
-    /// Findings of the source.
-    findings: Findings,
-    files: Vec<PathBuf>,
-}
-
 /// A recording's name; see [`tauscope_archive::name_of`].
 pub fn stem(recording: &Path) -> String {
     tauscope_archive::name_of(recording)
@@ -370,7 +288,7 @@ fn members(pipeline: &Pipeline, source: &Stage) -> Vec<usize> {
     let mut members: Vec<usize> = Vec::new();
     for (index, stage) in pipeline.stages.iter().enumerate() {
         let hangs = stage.inputs.iter().any(|input| members.contains(input));
-        let ours = !matches!(stage.settings, Settings::Outside(_));
+        let ours = stage.role.kind.placement != Placement::Program;
         if stage.name == source.name || (hangs && ours) {
             members.push(index);
         }

@@ -16,7 +16,7 @@ use tauscope_bus::{
 use tauscope_detect::{Config, DETECTORS, Threshold};
 use tauscope_pipeline::build;
 use tauscope_pipeline::cell::Cell;
-use tauscope_pipeline::pipeline::ROLE_KEYS;
+use tauscope_pipeline::pipeline::STAGES;
 use tauscope_pipeline::report::Problem;
 
 /// The system allocator with a counter per thread.
@@ -215,7 +215,7 @@ fn twin(cell: &Cell) -> Box<dyn Stage<JointState, TwinState>> {
 fn every_stage_is_deterministic_allocates_nothing_and_gets_over_gaps_nan_rates_and_resets() {
     let cell = cell();
     let behind_twin = |states: &[JointState]| run(&|| twin(&cell), states);
-    for role in ROLE_KEYS {
+    for role in STAGES.iter().map(|kind| kind.key) {
         match role {
             "twin" => keeps_its_promises(role, WARM, &|| twin(&cell), &<[JointState]>::to_vec),
             "detect" => detectors(&cell, &behind_twin),

@@ -3,7 +3,7 @@
 use tauscope_archive::{ArchiveError, JointFacts, JointTallies, Recording, ros};
 use tauscope_bus::MAX_JOINTS;
 
-use crate::assembler::{Assembler, Taken};
+use crate::assembler::{Assembler, Layouts, Taken};
 use crate::clock::{Clock, Stamps};
 use crate::error::{SessionError, Unusable};
 use crate::finding::{Effect, Finding};
@@ -13,7 +13,7 @@ use crate::selection::Selection;
 use crate::values::Ranges;
 
 /// Number of messages in the head of a topic.
-/// Resolution: bounded memory, some 5 MB; 100 s of an arm at 100 Hz.
+/// Resolution: bounded memory, 2 MB for seven joints; 100 s of an arm at 100 Hz.
 const HEAD: usize = 10_000;
 
 /// Factor by which a velocity differs from the derivative of the position that is not used.
@@ -142,9 +142,9 @@ impl Look {
         let mut joint_names = wanted.names.to_vec();
         let head = Head::read(recording, topic)?;
         let mut publishers = Publishers::of_recording();
-        for (log_time_ns, message) in &head.messages {
-            publishers.add(message, *log_time_ns);
-        }
+        head.each(|message, log_time_ns| {
+            publishers.add(message, log_time_ns);
+        });
         if joint_names.is_empty() {
             joint_names = published(&publishers.all);
         }
@@ -179,33 +179,32 @@ impl Look {
     fn judge_clock(&mut self, head: &Head) {
         let selection = &mut self.selection;
         let mut stamps = Stamps::default();
-        let mut last: Option<&ros::JointState> = None;
+        let mut last = ros::JointState::default();
+        let mut layouts = Layouts::new(&selection.joint_names);
         // Publishers of parts of one state share stamps rightly, so the clock is judged by one of them.
         let used = (0..selection.used.len()).filter(|&place| selection.used[place]);
         let main = used.max_by_key(|&place| selection.publishers.all[place].messages);
-        for (log_time_ns, message) in &head.messages {
+        head.each(|message, log_time_ns| {
             let place = selection.publishers.place(message);
             if !place.is_some_and(|place| selection.used[place]) {
-                continue;
-            }
-            if place == main {
-                let is_same = |last: &ros::JointState| {
-                    message.position == last.position && message.effort == last.effort
-                };
-                let is_new = !last.is_some_and(is_same);
-                stamps.add(message.header.stamp.ns(), *log_time_ns, is_new);
-                last = Some(message);
+                return;
             }
             let fields = [&message.position, &message.velocity, &message.effort];
+            if place == main {
+                let is_new = message.position != last.position || message.effort != last.effort;
+                stamps.add(message.header.stamp.ns(), log_time_ns, is_new);
+                last.position.clone_from(&message.position);
+                last.effort.clone_from(&message.effort);
+            }
+            let places = &layouts.of(&message.name).places;
             for (field, values) in fields.into_iter().enumerate() {
-                for (name, value) in message.name.iter().zip(values) {
-                    let joint = (selection.joint_names.iter()).position(|joint| joint == name);
+                for (joint, value) in places.iter().zip(values) {
                     if let Some(joint) = joint.filter(|_| value.is_finite()) {
                         selection.ranges.take(joint, field, *value);
                     }
                 }
             }
-        }
+        });
         (selection.clock, selection.of_clock) = stamps.clock(head.has_log_times);
     }
 
@@ -219,14 +218,14 @@ impl Look {
         let mut assembler = self.assembler().keeping_velocity();
         let mut tallies = JointTallies::in_order(self.joint_names());
         let count = self.joint_names().len();
-        for (log_time_ns, message) in &head.messages {
-            if let Taken::Follows(whole) = assembler.take(message, *log_time_ns)
+        head.each(|message, log_time_ns| {
+            if let Taken::Follows(whole) = assembler.take(message, log_time_ns)
                 && whole.has_velocity
             {
                 let (position, velocity) = (&whole.position[..count], &whole.velocity[..count]);
                 tallies.add_values(whole.stamp_ns, position, velocity, &[]);
             }
-        }
+        });
         let facts = tallies.facts();
         // Positions in degrees are another finding; the vibration of a joint at rest tells no velocity.
         let moves = |facts: &JointFacts| {
@@ -304,30 +303,88 @@ fn published(all: &[Publisher]) -> Vec<String> {
     names
 }
 
-/// The first messages of a topic.
+/// The first messages of a topic: the names of their joints once, and their numbers in one array.
+#[derive(Default)]
 struct Head {
-    /// Each with its log time \[ns\].
-    messages: Vec<(i64, ros::JointState)>,
+    messages: Vec<Brief>,
+    numbers: Vec<f64>,
+    /// Messages without numbers, one for each frame and list of names.
+    forms: Vec<ros::JointState>,
     /// Whether the format has a time of recording besides the stamps.
     has_log_times: bool,
+}
+
+/// A message of a [`Head`].
+struct Brief {
+    log_time_ns: i64,
+    stamp: ros::Time,
+    /// Its form.
+    form: usize,
+    /// Number of positions, velocities and efforts.
+    lengths: [usize; 3],
 }
 
 impl Head {
     fn read(recording: &Recording, topic: &str) -> Result<Self, SessionError> {
         let mut states = recording.joint_states(topic)?;
-        let mut messages = Vec::new();
+        let mut head = Self {
+            has_log_times: !recording.kind().is_table(),
+            ..Self::default()
+        };
         for _ in 0..HEAD {
             let Some(state) = states.next_state() else {
                 break;
             };
             // The reading that follows counts messages that cannot be decoded.
             if let Ok(state) = state {
-                messages.push((state.log_time_ns, state.message.clone()));
+                head.add(state.message, state.log_time_ns);
             }
         }
-        Ok(Self {
-            messages,
-            has_log_times: !recording.kind().is_table(),
-        })
+        Ok(head)
+    }
+
+    fn add(&mut self, message: &ros::JointState, log_time_ns: i64) {
+        let is_form = |form: &ros::JointState| {
+            form.name == message.name && form.header.frame_id == message.header.frame_id
+        };
+        let known = self.forms.iter().position(is_form);
+        let form = known.unwrap_or_else(|| {
+            self.forms.push(ros::JointState {
+                header: message.header.clone(),
+                name: message.name.clone(),
+                ..ros::JointState::default()
+            });
+            self.forms.len() - 1
+        });
+        let fields = [&message.position, &message.velocity, &message.effort];
+        fields.map(|field| self.numbers.extend_from_slice(field));
+        self.messages.push(Brief {
+            log_time_ns,
+            stamp: message.header.stamp,
+            form,
+            lengths: fields.map(Vec::len),
+        });
+    }
+
+    /// Calls `visit` with each message and its log time \[ns\], in the order of the recording.
+    fn each(&self, mut visit: impl FnMut(&ros::JointState, i64)) {
+        let mut forms = self.forms.clone();
+        let mut numbers = &*self.numbers;
+        for brief in &self.messages {
+            let message = &mut forms[brief.form];
+            message.header.stamp = brief.stamp;
+            let fields = [
+                &mut message.position,
+                &mut message.velocity,
+                &mut message.effort,
+            ];
+            for (field, length) in fields.into_iter().zip(brief.lengths) {
+                let (own, rest) = numbers.split_at(length);
+                numbers = rest;
+                field.clear();
+                field.extend_from_slice(own);
+            }
+            visit(message, brief.log_time_ns);
+        }
     }
 }

@@ -101,7 +101,7 @@ fn json(pipeline: &Pipeline, links: &[plan::Link]) -> serde_json::Value {
     let stages = pipeline.stages.iter().map(|stage| {
         json!({
             "name": stage.name,
-            "is": stage.role.key(),
+            "is": stage.role.kind.key,
             "host": stage.host,
             "process": stage.process,
             "cells": stage.cells,

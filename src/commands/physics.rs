@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use tauscope_fleet::physics::Row;
 use tauscope_pipeline::cell::EffortUnit;
 use tauscope_pipeline::pipeline::Pipeline;
+use tauscope_pipeline::pipeline::stages::twin::TwinSettings;
 use tauscope_pipeline::report::Problem;
-use tauscope_pipeline::settings::Settings;
 
 use super::effort_unit;
 use crate::existing::Force;
@@ -153,10 +153,8 @@ fn request(args: &Args, recordings: &[PathBuf]) -> Result<(Request, String), Fai
         .stages
         .iter()
         .filter(|stage| stage.cells.contains(&name));
-    let model = of_cell.filter_map(|stage| match &stage.settings {
-        Settings::Twin { config, .. } => config.model.clone(),
-        _ => None,
-    });
+    let twins = of_cell.filter_map(|stage| stage.settings.get::<TwinSettings>());
+    let model = twins.filter_map(|twin| twin.config.model.clone());
     // Relative to the pipeline file, as in `run` and `replay`.
     let folder = pipeline.path.parent().unwrap_or(Path::new(""));
     let model = model.map(|path| folder.join(path));

@@ -6,7 +6,6 @@ use std::time::Duration;
 use anyhow::Context;
 use tauscope_pipeline::pipeline::{Pipeline, Stage};
 use tauscope_pipeline::report::{Problem, Report};
-use tauscope_pipeline::settings::Settings;
 use tauscope_pipeline::suggest;
 use tauscope_record::Existing;
 
@@ -118,7 +117,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
 /// Lets all recorders replace files.
 fn replace_files(pipeline: &mut Pipeline) {
     for stage in &mut pipeline.stages {
-        if let Settings::Record(config) = &mut stage.settings {
+        if let Some(config) = stage.settings.get_mut::<tauscope_record::Config>() {
             config.existing = Existing::Replace;
         }
     }
@@ -129,7 +128,7 @@ fn keep_files(pipeline: &Pipeline, host: Option<&str>) -> Result<(), Failure> {
     let mut report = Report::default();
     let here = |stage: &&Stage| host.is_none() || stage.host.as_deref() == host;
     for stage in pipeline.stages.iter().filter(here) {
-        let Settings::Record(config) = &stage.settings else {
+        let Some(config) = stage.settings.get::<tauscope_record::Config>() else {
             continue;
         };
         if config.existing == Existing::Replace {

@@ -153,7 +153,7 @@ fn meeting_point(args: &Args) -> Result<(String, ZenohEndpoints), Failure> {
         .stages
         .iter()
         .filter(|stage| in_cell(&stage.cell))
-        .find_map(|stage| stage.ingest.as_ref()?.commands.as_ref());
+        .find_map(|stage| stage.config::<tauscope_ingest::Config>()?.commands.as_ref());
     let Some(endpoints) = endpoints else {
         let problem = Problem::new(format!("the source of `{cell}` takes no commands"));
         let help = "give its `ingest` a place for them: `commands: {listen: [tcp/127.0.0.1:7448]}`";

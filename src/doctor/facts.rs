@@ -8,8 +8,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use rustix::process::{Resource, getrlimit};
 use tauscope_archive::whole_file;
+use tauscope_pipeline::pipeline::stages::ingest::IngestSettings;
+use tauscope_pipeline::pipeline::stages::publish::PublishSettings;
 use tauscope_pipeline::pipeline::{Pipeline, Stage};
-use tauscope_pipeline::settings::Settings;
 
 use super::{certificate, endpoint};
 
@@ -115,7 +116,7 @@ pub fn read(pipeline: Option<&Pipeline>, host: Option<&str>) -> Facts {
     let mut endpoints = Vec::new();
     for stage in pipeline.stages.iter().filter(here) {
         endpoints_of(stage, &mut endpoints);
-        if let Settings::Record(config) = &stage.settings {
+        if let Some(config) = stage.settings.get::<tauscope_record::Config>() {
             let cell = stage.cells.first().map_or("", String::as_str);
             let mut folders = config.folders(cell);
             folders.dedup();
@@ -233,30 +234,27 @@ fn endpoints_of(stage: &Stage, endpoints: &mut Vec<(String, String, Way)>) {
         let of = |at: &String| (stage.name.clone(), at.clone(), is);
         endpoints.extend(at.iter().map(of));
     };
-    match &stage.settings {
-        Settings::Ingest(config) => {
-            if let Some(zenoh) = &config.zenoh {
-                add(&zenoh.listen, Way::Listen);
-                add(&zenoh.connect, Way::Connect);
-            }
-            if let Some(ur) = &config.ur_rtde {
-                add(&[format!("tcp/{}:{}", ur.host, ur.port)], Way::Controller);
-            }
-            if let Some(commands) = &config.commands {
-                add(&commands.listen, Way::Listen);
-                add(&commands.connect, Way::Connect);
-            }
+    if let Some(IngestSettings { config, .. }) = stage.settings.get() {
+        if let Some(zenoh) = &config.zenoh {
+            add(&zenoh.listen, Way::Listen);
+            add(&zenoh.connect, Way::Connect);
         }
-        Settings::Publish { config, .. } => {
-            if let Some(zenoh) = &config.zenoh {
-                add(&zenoh.listen, Way::Listen);
-                add(&zenoh.connect, Way::Connect);
-            }
-            if let Some(modbus) = &config.modbus {
-                add(&[format!("tcp/{}", modbus.listen)], Way::Listen);
-            }
+        if let Some(ur) = &config.ur_rtde {
+            add(&[format!("tcp/{}:{}", ur.host, ur.port)], Way::Controller);
         }
-        _ => {}
+        if let Some(commands) = &config.commands {
+            add(&commands.listen, Way::Listen);
+            add(&commands.connect, Way::Connect);
+        }
+    }
+    if let Some(PublishSettings { config, .. }) = stage.settings.get() {
+        if let Some(zenoh) = &config.zenoh {
+            add(&zenoh.listen, Way::Listen);
+            add(&zenoh.connect, Way::Connect);
+        }
+        if let Some(modbus) = &config.modbus {
+            add(&[format!("tcp/{}", modbus.listen)], Way::Listen);
+        }
     }
 }
 

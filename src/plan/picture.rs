@@ -28,7 +28,7 @@ pub fn mermaid(pipeline: &Pipeline, links: &[Link]) -> String {
             let mut in_process = String::new();
             for &index in &stages {
                 let stage = &pipeline.stages[index];
-                let (name, role) = (&stage.name, stage.role.key());
+                let (name, role) = (&stage.name, stage.role.kind.key);
                 let _ = writeln!(in_process, "  s{index}[\"{name}<br/>{role}\"]");
             }
             let several = process.filter(|_| stages.len() > 1);
@@ -79,7 +79,7 @@ pub fn dot(pipeline: &Pipeline, links: &[Link]) -> String {
             }
             for index in stages {
                 let stage = &pipeline.stages[index];
-                let (name, role) = (&stage.name, stage.role.key());
+                let (name, role) = (&stage.name, stage.role.kind.key);
                 let _ = writeln!(text, "  s{index} [label=\"{name}\\n{role}\"];");
             }
             if several.is_some() {

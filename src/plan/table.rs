@@ -43,12 +43,12 @@ fn stages(pipeline: &Pipeline) -> String {
         let cells: Vec<&str> = stage.cells.iter().map(String::as_str).collect();
         table.add_row([
             stage.name.clone(),
-            stage.role.key().to_owned(),
+            stage.role.kind.key.to_owned(),
             cells.join(", "),
             stage.host.clone().unwrap_or_else(|| "this one".to_owned()),
             stage.process.clone(),
             inputs.join(", "),
-            stage.role.gives().map_or("", words_for).to_owned(),
+            stage.role.gives.map_or("", words_for).to_owned(),
         ]);
     }
     table.trim_fmt()

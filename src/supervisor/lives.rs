@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde::Deserialize;
 use tauscope_bus::Seat;
-use tauscope_pipeline::pipeline::{Pipeline, Role};
+use tauscope_pipeline::pipeline::{Pipeline, Placement};
 use tokio::time::Instant;
 
 use super::Supervisor;
@@ -35,7 +35,7 @@ pub(super) fn workers(
             .iter()
             .position(|worker| worker.name == stage.process);
         let place = place.unwrap_or_else(|| {
-            let outside = matches!(stage.role, Role::Outside(_));
+            let outside = stage.role.kind.placement == Placement::Program;
             workers.push(Worker::new(&stage.process, outside));
             workers.len() - 1
         });

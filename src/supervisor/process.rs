@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use anyhow::Context;
 use rustix::process::{Pid, Signal, kill_process_group};
-use tauscope_pipeline::settings::{OutsideEntry, Settings};
+use tauscope_pipeline::pipeline::Settings;
+use tauscope_pipeline::pipeline::stages::outside::OutsideEntry;
 use tokio::io::{AsyncBufReadExt, AsyncRead, AsyncWriteExt, BufReader};
 use tokio::process::{Child, ChildStdin, Command};
 use tokio::sync::mpsc;
@@ -40,14 +41,14 @@ pub struct Process {
 pub fn command(settings: &Settings, folder: &Path) -> anyhow::Result<Command> {
     let program = std::env::current_exe().context("cannot find the program itself")?;
     let mut command = Command::new(program);
-    match settings {
-        Settings::Outside(OutsideEntry { command: words, .. }) => {
+    match settings.get() {
+        Some(OutsideEntry { command: words, .. }) => {
             command.arg("exec").arg("--").args(words);
             if !folder.as_os_str().is_empty() {
                 command.current_dir(folder);
             }
         }
-        _ => {
+        None => {
             command.arg("stage");
         }
     }

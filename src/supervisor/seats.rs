@@ -6,11 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use tauscope_bus::link::SpillSettings;
 use tauscope_bus::seat::{Cell as SeatCell, Input, Output, OutputLink, TransportKind};
 use tauscope_bus::{Audience, Domain, Keep, SampleKind, Seat, Wake, ZenohEndpoints};
-use tauscope_pipeline::build::StreamFacts;
 use tauscope_pipeline::cell::CellFacts;
-use tauscope_pipeline::pipeline::{Pipeline, Role};
-use tauscope_pipeline::scenario::ScenarioFacts;
-use tauscope_pipeline::settings::Settings;
+use tauscope_pipeline::pipeline::stages::ingest::IngestSettings;
+use tauscope_pipeline::pipeline::stages::outside::OutsideEntry;
+use tauscope_pipeline::pipeline::{Pipeline, Placement, Settings, StreamFacts};
 
 use crate::plan::{Link, Over};
 
@@ -43,13 +42,10 @@ pub struct Instructions {
     pub settings: Settings,
     /// Its cells.
     pub cells: Vec<CellFacts>,
-    /// Facts about its input streams, for a recorder or a publisher.
+    /// Its input streams, for a recorder or a publisher.
     pub streams: Vec<StreamFacts>,
-    /// Provenance of the archive, for a recorder.
+    /// Provenance of the archive, for a recorder or a publisher.
     pub provenance: BTreeMap<String, String>,
-    /// Scenario, for a simulated source.
-    #[serde(default)]
-    pub scenario: Option<ScenarioFacts>,
     /// Stamp of the last emitted sample, for a source that is restarted \[ns\].
     #[serde(default)]
     pub after_ns: Option<i64>,
@@ -99,7 +95,7 @@ impl Planner<'_> {
             .filter_map(|cell| self.cell(cell))
             .collect();
         seat.inputs = self.inputs(at);
-        seat.output = stage.role.gives().map(|kind| self.output(at, kind));
+        seat.output = stage.role.gives.map(|kind| self.output(at, kind));
         seat.health = Some(self.health(at));
         let outputs = seat
             .output
@@ -123,9 +119,9 @@ impl Planner<'_> {
             });
             seat.start_within_ms = START_ACROSS_HOSTS_MS;
         }
-        seat.config = match &stage.settings {
-            Settings::Outside(outside) => outside.settings.clone().unwrap_or_default(),
-            settings => serde_json::to_value(self.instructions(at, settings))?,
+        seat.config = match stage.settings.get::<OutsideEntry>() {
+            Some(outside) => outside.settings.clone().unwrap_or_default(),
+            None => serde_json::to_value(self.instructions(at))?,
         };
         Ok(seat)
     }
@@ -142,28 +138,25 @@ impl Planner<'_> {
         count.into_values().max().unwrap_or(0) + LIVES
     }
 
-    fn instructions(&self, at: usize, settings: &Settings) -> Instructions {
+    fn instructions(&self, at: usize) -> Instructions {
         let stage = &self.pipeline.stages[at];
         let cells = stage
             .cells
             .iter()
             .filter_map(|cell| self.pipeline.cells.get(cell));
-        let is_recorder = stage.role == Role::Record;
-        let hears_all = stage.role.hears_health();
+        let (streams, provenance) = if stage.role.kind.hears_health {
+            (
+                self.pipeline.streams(&stage.inputs),
+                self.pipeline.provenance(),
+            )
+        } else {
+            Default::default()
+        };
         Instructions {
-            settings: settings.clone(),
+            settings: stage.settings.clone(),
             cells: cells.map(|cell| cell.facts.clone()).collect(),
-            streams: if hears_all {
-                self.pipeline.streams(&stage.inputs)
-            } else {
-                Vec::new()
-            },
-            provenance: if is_recorder {
-                self.pipeline.provenance()
-            } else {
-                BTreeMap::new()
-            },
-            scenario: stage.scenario.clone(),
+            streams,
+            provenance,
             after_ns: None,
             somebody_learns: self.learns(&stage.cells),
         }
@@ -173,11 +166,7 @@ impl Planner<'_> {
     fn learns(&self, cells: &BTreeSet<String>) -> bool {
         let stages = self.pipeline.stages.iter();
         let mut there = stages.filter(|stage| stage.cells.iter().any(|cell| cells.contains(cell)));
-        there.any(|stage| match &stage.settings {
-            Settings::Detect { config, .. } => config.learns_when_told(),
-            Settings::Outside(_) => true,
-            _ => false,
-        })
+        there.any(|stage| stage.settings.learns_when_told())
     }
 
     fn cell(&self, name: &str) -> Option<SeatCell> {
@@ -222,7 +211,7 @@ impl Planner<'_> {
 
     /// Returns whether a stage receives health reports: a recorder stores them, a publisher publishes them.
     fn hears_health(&self, at: usize) -> bool {
-        self.pipeline.stages[at].role.hears_health()
+        self.pipeline.stages[at].role.kind.hears_health
     }
 
     fn output(&self, at: usize, kind: SampleKind) -> Output {
@@ -257,7 +246,7 @@ impl Planner<'_> {
                 keep_all: count(Keep::All),
                 keep_newest: count(Keep::Newest),
             };
-            let takes = |link: &&Link| self.pipeline.stages[link.to].role.gives().is_none();
+            let takes = |link: &&Link| self.pipeline.stages[link.to].role.gives.is_none();
             let all_take = there().all(takes);
             // Health reports are rare: the link itself has room for those of a quarter of an hour.
             let may_block = match over {
@@ -265,7 +254,8 @@ impl Planner<'_> {
                 Over::SharedMemory => audience.keep_all > 0 && kind != SampleKind::Health,
                 Over::Zenoh => true,
             };
-            let ours = !matches!(self.pipeline.stages[at].settings, Settings::Outside(_));
+            let placement = self.pipeline.stages[at].role.kind.placement;
+            let ours = placement != Placement::Program;
             let spill = (may_block && ours).then(|| SpillSettings {
                 bytes: match over {
                     Over::Zenoh => SPILL_ACROSS_HOSTS_BYTES,
@@ -301,12 +291,10 @@ impl Planner<'_> {
     /// program is assumed to be able to wait.
     fn source_can_wait(&self, at: usize) -> bool {
         let stage = &self.pipeline.stages[at];
-        match (&stage.settings, stage.inputs.first()) {
-            (Settings::Ingest(config), _) => config
-                .source()
-                .is_ok_and(|(_, source)| source.file().is_some()),
-            (_, Some(&input)) => self.source_can_wait(input),
-            (_, None) => true,
+        match (stage.settings.get::<IngestSettings>(), stage.inputs.first()) {
+            (Some(source), _) => source.reads_file(),
+            (None, Some(&input)) => self.source_can_wait(input),
+            (None, None) => true,
         }
     }
 }

@@ -6,7 +6,8 @@ use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 use tauscope_bus::{ReceiverCounts, SampleKind, Trouble};
 use tauscope_pipeline::pipeline::Pipeline;
-use tauscope_pipeline::settings::Settings;
+use tauscope_pipeline::pipeline::Settings;
+use tauscope_pipeline::pipeline::stages::ingest::IngestSettings;
 
 use super::local::Local;
 use crate::exit::Exit;
@@ -344,13 +345,8 @@ impl StageSummary {
 /// Returns whether a stage receives from a robot, which does not wait for it; of an external program this is not
 /// known.
 fn is_live_source(settings: &Settings) -> bool {
-    match settings {
-        Settings::Ingest(config) => {
-            let source = config.source();
-            source.is_ok_and(|(_, source)| source.file().is_none())
-        }
-        _ => false,
-    }
+    let source = settings.get::<IngestSettings>();
+    source.is_some_and(|source| !source.reads_file())
 }
 
 fn new(header: &[&str]) -> Table {

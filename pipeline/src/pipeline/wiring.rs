@@ -9,8 +9,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_bus::Name;
 
-use super::file::{PipelineFile, StageEntry, stage_place};
-use super::role::{ROLE_KEYS, Role};
+use super::file::PipelineFile;
+use super::stage::entry::{StageEntry, stage_place};
+use super::stage::role::Role;
 use crate::report::Report;
 use crate::suggest;
 use crate::yaml::{Located, Place};
@@ -32,8 +33,9 @@ pub struct Wiring {
     pub processes: Vec<String>,
 }
 
-/// Checks names, roles, inputs, cells and hosts; `None` if they are invalid.
-pub fn check(file: &Located<PipelineFile>, report: &mut Report) -> Option<Wiring> {
+/// Checks names, roles, inputs, cells and hosts; `None` if they are invalid. `kinds` are the keys that define the
+/// kind of a stage.
+pub fn check(file: &Located<PipelineFile>, kinds: &[&str], report: &mut Report) -> Option<Wiring> {
     let mut checker = Checker {
         file,
         stages: &file.value.stages,
@@ -41,7 +43,7 @@ pub fn check(file: &Located<PipelineFile>, report: &mut Report) -> Option<Wiring
         broken: false,
     };
     checker.names();
-    let roles = checker.roles();
+    let roles = checker.roles(kinds);
     let hosts = checker.hosts();
     checker.endpoints();
     let by_name = checker.stages_by_name();
@@ -149,26 +151,26 @@ impl Checker<'_> {
         }
     }
 
-    fn roles(&mut self) -> Vec<Option<Role>> {
+    fn roles(&mut self, kinds: &[&str]) -> Vec<Option<Role>> {
         let mut roles = Vec::new();
         for (index, stage) in self.stages.iter().enumerate() {
             let place = stage_place(index);
-            let claimed = Role::claimed(stage);
-            match claimed.as_slice() {
-                [(_, role)] => {
-                    roles.push(Some(*role));
+            match stage.parts.as_slice() {
+                [part] => {
+                    roles.push(Some(part.config.role()));
                     continue;
                 }
                 [] => {
                     let title = format!("stage `{}` does not say what it is", stage.name);
-                    let keys = suggest::list(ROLE_KEYS);
+                    let keys = suggest::list(kinds.iter().copied());
                     self.wrong(
                         self.file
                             .at(&place, title)
                             .help(format!("give one of {keys}")),
                     );
                 }
-                [(first, _), (second, _), ..] => {
+                [first, second, ..] => {
+                    let (first, second) = (first.key, second.key);
                     let title = format!("stage `{}` is two things at once", stage.name);
                     let problem = self
                         .file

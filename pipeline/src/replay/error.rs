@@ -1,6 +1,7 @@
 //! Errors of a replay.
 
 use crate::build;
+use crate::pipeline::NodeError;
 
 /// Error that prevents or ends a replay.
 #[derive(Debug, thiserror::Error)]
@@ -28,9 +29,9 @@ pub enum ReplayError {
     /// A stage that cannot be built.
     #[error(transparent)]
     Build(#[from] build::BuildError),
-    /// Output that cannot be written.
+    /// A stage whose node cannot be created.
     #[error(transparent)]
-    Record(#[from] tauscope_record::RecordError),
+    Node(#[from] NodeError),
     /// A stage that failed during the replay.
     #[error(transparent)]
     Stage(#[from] tauscope_bus::StageError),
@@ -47,7 +48,8 @@ impl ReplayError {
     pub fn is_input(&self) -> bool {
         match self {
             Self::Ingest(error) => error.is_input(),
-            Self::Record(_) | Self::Stage(_) | Self::Link(_) | Self::Interrupted => false,
+            Self::Node(error) => error.is_input(),
+            Self::Stage(_) | Self::Link(_) | Self::Interrupted => false,
             _ => true,
         }
     }

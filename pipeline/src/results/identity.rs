@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use super::manifest::Wanted;
 use crate::pipeline::Pipeline;
+use crate::pipeline::stages::detect::DetectSettings;
 use crate::provenance::{sha256, sha256_of_file};
 use crate::replay::{TwinChoice, stem};
 use crate::report::{Problem, Report};
-use crate::settings::Settings;
 
 /// Version of the rows in a result. A change of their columns or meaning needs a new version, which changes all
 /// names.
@@ -31,7 +31,7 @@ impl Identity {
         facts.insert("twin".to_owned(), format!("{twin:?}").to_lowercase());
         facts.insert("scores".to_owned(), with_scores.to_string());
         for stage in &pipeline.stages {
-            let Settings::Detect { config, .. } = &stage.settings else {
+            let Some(DetectSettings { config, .. }) = stage.settings.get() else {
                 continue;
             };
             // The identity depends on the content of the files, not on their paths.

@@ -3,7 +3,7 @@
 use tauscope_bus::link::zenoh::check_endpoint;
 
 use super::Checker;
-use crate::pipeline::file::stage_place;
+use crate::pipeline::stage::entry::stage_place;
 use crate::yaml::Place;
 
 impl Checker<'_> {
@@ -18,7 +18,7 @@ impl Checker<'_> {
         }
         for (at, stage) in file.value.stages.iter().enumerate() {
             let place = stage_place(at);
-            if let Some(ingest) = &stage.ingest {
+            if let Some(ingest) = stage.config::<tauscope_ingest::Config>() {
                 let place = place.key("ingest");
                 if let Some(zenoh) = &ingest.zenoh {
                     all.push((place.key("zenoh").key("connect"), &zenoh.connect));
@@ -29,7 +29,8 @@ impl Checker<'_> {
                     all.push((place.key("commands").key("listen"), &commands.listen));
                 }
             }
-            if let Some(zenoh) = stage.publish.as_ref().and_then(|it| it.zenoh.as_ref()) {
+            let publish = stage.config::<tauscope_publish::Config>();
+            if let Some(zenoh) = publish.and_then(|it| it.zenoh.as_ref()) {
                 let place = place.key("publish").key("zenoh");
                 all.push((place.key("connect"), &zenoh.connect));
                 all.push((place.key("listen"), &zenoh.listen));

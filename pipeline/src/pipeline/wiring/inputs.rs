@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::{Checker, Input};
-use crate::pipeline::file::stage_place;
-use crate::pipeline::role::{Role, Takes, makers_of, words_for};
+use crate::pipeline::stage::entry::stage_place;
+use crate::pipeline::stage::role::{Role, Takes, makers_of, words_for};
 use crate::suggest;
 use crate::yaml::Place;
 
@@ -68,7 +68,7 @@ impl<'a> Checker<'a> {
     fn number_of_inputs(&mut self, index: usize, role: Role, named: &[(&str, Place)]) {
         let stage = &self.stages[index];
         let place = stage_place(index);
-        let key = role.key();
+        let key = role.kind.key;
         if stage.input.is_some() && stage.inputs.is_some() {
             let problem = self
                 .file
@@ -77,7 +77,7 @@ impl<'a> Checker<'a> {
             self.wrong(problem);
             return;
         }
-        let problem = match (role.takes(), named) {
+        let problem = match (role.takes, named) {
             (Takes::Nothing, [(_, first), ..]) => {
                 let title = format!("an `{key}` stage is a source and takes no input");
                 self.file.at(first, title)
@@ -114,16 +114,16 @@ impl<'a> Checker<'a> {
                     continue;
                 };
                 let name = &self.stages[input.stage].name;
-                let Some(given) = maker.gives() else {
+                let Some(given) = maker.gives else {
                     let title = format!("`{name}` has no output stream to listen to");
                     self.wrong(self.file.at(&input.place, title));
                     continue;
                 };
-                let Takes::One(wanted) = role.takes() else {
+                let Takes::One(wanted) = role.takes else {
                     continue;
                 };
                 if given != wanted {
-                    let key = role.key();
+                    let key = role.kind.key;
                     let title = format!(
                         "a `{key}` stage takes {}, but `{name}` puts out {}",
                         words_for(wanted),

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::{Checker, Input};
-use crate::pipeline::file::stage_place;
-use crate::pipeline::role::{Role, Takes};
+use crate::pipeline::stage::entry::stage_place;
+use crate::pipeline::stage::role::{Role, Takes};
 use crate::suggest;
 use crate::yaml::Place;
 
@@ -86,7 +86,7 @@ impl Checker<'_> {
             }
             let is_source = stage.input.is_none()
                 && roles[index]
-                    .is_some_and(|role| matches!(role.takes(), Takes::Nothing | Takes::AnyOne));
+                    .is_some_and(|role| matches!(role.takes, Takes::Nothing | Takes::AnyOne));
             if is_source && stage.cell.is_none() && only.is_none() {
                 let title = format!(
                     "stage `{}` does not say which cell it belongs to",

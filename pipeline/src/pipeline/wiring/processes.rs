@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::Checker;
-use crate::pipeline::file::stage_place;
-use crate::pipeline::role::Role;
+use crate::pipeline::stage::entry::stage_place;
+use crate::pipeline::stage::role::{Placement, Role};
 use crate::yaml::Place;
 
 impl Checker<'_> {
@@ -22,11 +22,8 @@ impl Checker<'_> {
             let named = file.cells.get(cell)?.process.as_ref();
             Some(named.or(file.process.as_ref()).unwrap_or(cell).clone())
         };
-        let joins = |role| {
-            matches!(
-                role,
-                Some(Role::Ingest | Role::Twin | Role::Detect | Role::Watch)
-            )
+        let joins = |role: Option<Role>| {
+            role.is_some_and(|role| role.kind.placement == Placement::WithCell)
         };
         let named: Vec<Option<String>> = (self.stages.iter().zip(roles).enumerate())
             .map(|(index, (stage, role))| {
@@ -36,7 +33,7 @@ impl Checker<'_> {
             .collect();
         let taken: BTreeSet<&String> = named.iter().flatten().collect();
         let alone = (self.stages.iter().zip(roles)).map(|(stage, role)| {
-            let key = role.map_or("stage", Role::key);
+            let key = role.map_or("stage", |role| role.kind.key);
             if taken.contains(&stage.name) {
                 format!("{}_{key}", stage.name)
             } else {
@@ -64,7 +61,9 @@ impl Checker<'_> {
             self.simple_name(name, &place, "process");
         }
         for (index, stage) in self.stages.iter().enumerate() {
-            if let (Some(_), Some(Role::Outside(_))) = (&stage.process, roles[index]) {
+            let is_program =
+                roles[index].is_some_and(|role| role.kind.placement == Placement::Program);
+            if stage.process.is_some() && is_program {
                 let place = stage_place(index).key("process");
                 let title = format!("`{}` is a program, which is a process itself", stage.name);
                 let problem = self.file.at_key(&place, title);

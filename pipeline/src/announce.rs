@@ -9,7 +9,7 @@ use tauscope_bus::{
     flags,
 };
 
-use tauscope_pipeline::cell::CellFacts;
+use crate::cell::CellFacts;
 use tauscope_watch as watch;
 
 /// A detect or explain stage whose events are reported to the supervisor; its output stream is unchanged.

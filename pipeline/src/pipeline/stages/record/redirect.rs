@@ -1,19 +1,20 @@
-//! Output paths of a pipeline's recorders in a replay.
+//! Output paths of a recorder in a replay.
 
 use std::path::{Path, PathBuf};
 
-use tauscope_record::{Existing, FileName};
+use tauscope_record::{Config, Existing, FileName};
 
 /// Returns a recorder's configuration for a replay: the same kinds of file, written to `out` and named after the
 /// recording, without a connection to a live viewer. `None` without `out`.
-pub(super) fn redirect(
-    config: &tauscope_record::Config,
+pub fn redirect(
+    config: &Config,
     out: Option<&Path>,
-    stem: &str,
+    recording: &Path,
     files: &mut Vec<PathBuf>,
-) -> Option<tauscope_record::Config> {
+) -> Option<Config> {
     let out = out?;
-    let mut config = tauscope_record::Config {
+    let stem = tauscope_archive::name_of(recording);
+    let mut config = Config {
         // Each replay replaces the result of the recording.
         split: None,
         keep: None,
@@ -24,7 +25,7 @@ pub(super) fn redirect(
     };
     if let Some(around) = &mut config.around_alarms {
         for (path, kind) in [(&mut around.mcap, "mcap"), (&mut around.rerun, "rrd")] {
-            let stem = FileName::literal(&out.join(stem));
+            let stem = FileName::literal(&out.join(&stem));
             let name = format!("{}.alarm-{{date}}-{{time}}.{kind}", stem.display());
             *path = path.take().map(|_| name.into());
         }

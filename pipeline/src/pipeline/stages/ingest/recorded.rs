@@ -12,7 +12,7 @@ use crate::cell::Cell;
 
 /// Opens a recording without pacing, with a handle to its findings. The columns of a table come from the pipeline,
 /// else from its header or from a file next to it.
-pub(super) fn recording(
+pub fn open(
     config: &Config,
     recording: &Path,
     cell: &Cell,
@@ -45,7 +45,7 @@ pub(super) fn recording(
 }
 
 /// File settings of a recording with the pipeline's topics.
-pub(super) fn file_config(config: &Config, recording: &Path) -> FileConfig {
+pub fn file_config(config: &Config, recording: &Path) -> FileConfig {
     let topics = config.source().ok().and_then(|(_, source)| source.topics());
     // The archive of a simulated cell also contains the requests to learn.
     let simulated = || Topics {
