@@ -1,7 +1,8 @@
 //! Nanoseconds per call of the algorithms on one robot: `cargo bench -p tauscope-dynamics --bench per_call -- URDF`.
 //!
-//! A line each: algorithm, nanoseconds per call (the fastest of twenty rounds, so that what else runs counts little),
-//! and a sum of what it answered, by which another library can be held against it. The states are those of
+//! A line each: algorithm, nanoseconds per sample (the fastest of twenty rounds, so that what else runs counts little),
+//! and a sum of what it answered, by which another library can be held against it. `batch_` stands before an algorithm
+//! that takes four samples at once. The states are those of
 //! `benches/pinocchio/per_call.cpp`.
 
 use std::error::Error;
@@ -9,7 +10,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use tauscope_dynamics::{
-    Data, Model, forward_kinematics, link_jacobian, mass_matrix, regressor, rnea,
+    Data, Lanes, Model, Real, forward_kinematics, link_jacobian, mass_matrix, regressor, rnea,
 };
 
 /// States that are gone through.
@@ -18,13 +19,14 @@ const STATES: usize = 256;
 const PASSES: usize = 40;
 const ROUNDS: usize = 20;
 
-struct State {
-    q: Vec<f64>,
-    qd: Vec<f64>,
-    qdd: Vec<f64>,
+/// A state of one sample, or of as many as `T` has lanes.
+struct State<T> {
+    q: Vec<T>,
+    qd: Vec<T>,
+    qdd: Vec<T>,
 }
 
-fn states(dof: usize) -> Vec<State> {
+fn states(dof: usize) -> Vec<State<f64>> {
     let of = |f: fn(f64, f64) -> f64, k: usize| (0..dof).map(|j| f(k as f64, j as f64)).collect();
     let state = |k| State {
         q: of(|k, j| (0.7 * k + 1.3 * j).sin(), k),
@@ -34,7 +36,22 @@ fn states(dof: usize) -> Vec<State> {
     (0..STATES).map(state).collect()
 }
 
-fn measure(algorithm: &str, states: &[State], mut call: impl FnMut(&State)) {
+/// The same states, four at once.
+fn batches(states: &[State<f64>]) -> Vec<State<Lanes>> {
+    let of = |four: &[State<f64>; 4], field: fn(&State<f64>) -> &[f64]| {
+        let joint = |j: usize| Lanes::from([0, 1, 2, 3].map(|lane| field(&four[lane])[j]));
+        (0..field(&four[0]).len()).map(joint).collect()
+    };
+    let (fours, _) = states.as_chunks::<4>();
+    let batch = |four: &[State<f64>; 4]| State {
+        q: of(four, |s| &s.q),
+        qd: of(four, |s| &s.qd),
+        qdd: of(four, |s| &s.qdd),
+    };
+    fours.iter().map(batch).collect()
+}
+
+fn measure<T>(algorithm: &str, states: &[State<T>], mut call: impl FnMut(&State<T>)) {
     let round = |_| {
         let begin = Instant::now();
         for _ in 0..PASSES {
@@ -48,8 +65,53 @@ fn measure(algorithm: &str, states: &[State], mut call: impl FnMut(&State)) {
     print!("{algorithm} {fastest:.2} ");
 }
 
-fn squares(values: &[f64]) -> f64 {
-    values.iter().map(|value| value * value).sum()
+fn squares<T: Real>(values: &[T]) -> f64 {
+    let square = |value: &T| *value * *value;
+    values
+        .iter()
+        .map(|value| square(value).simd_horizontal_sum())
+        .sum()
+}
+
+fn algorithms<T: Real>(prefix: &str, model: &Model, states: &[State<T>]) {
+    let mut data = Data::<T>::new(model);
+    let tip = model.links().len() - 1;
+
+    measure(&format!("{prefix}rnea"), states, |s| {
+        black_box(rnea(model, &mut data, &s.q, &s.qd, &s.qdd));
+    });
+    let sum: f64 = (states.iter())
+        .map(|s| squares(rnea(model, &mut data, &s.q, &s.qd, &s.qdd)))
+        .sum();
+    println!("{sum:.9e}");
+
+    measure(&format!("{prefix}regressor"), states, |s| {
+        black_box(regressor(model, &mut data, &s.q, &s.qd, &s.qdd));
+    });
+    let sum: f64 = (states.iter())
+        .map(|s| squares(regressor(model, &mut data, &s.q, &s.qd, &s.qdd).as_slice()))
+        .sum();
+    println!("{sum:.9e}");
+
+    measure(&format!("{prefix}jacobian"), states, |s| {
+        forward_kinematics(model, &mut data, &s.q);
+        black_box(link_jacobian(model, &mut data, tip));
+    });
+    let sum: f64 = (states.iter())
+        .map(|s| {
+            forward_kinematics(model, &mut data, &s.q);
+            squares(link_jacobian(model, &mut data, tip).as_slice())
+        })
+        .sum();
+    println!("{sum:.9e}");
+
+    measure(&format!("{prefix}mass_matrix"), states, |s| {
+        black_box(mass_matrix(model, &mut data, &s.q));
+    });
+    let sum: f64 = (states.iter())
+        .map(|s| squares(mass_matrix(model, &mut data, &s.q).as_slice()))
+        .sum();
+    println!("{sum:.9e}");
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -59,44 +121,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Ok(());
     };
     let model = Model::from_urdf(&std::fs::read_to_string(path)?)?;
-    let mut data = Data::new(&model);
     let states = states(model.dof());
-    let tip = model.links().len() - 1;
-
-    measure("rnea", &states, |s| {
-        black_box(rnea(&model, &mut data, &s.q, &s.qd, &s.qdd));
-    });
-    let sum: f64 = (states.iter())
-        .map(|s| squares(rnea(&model, &mut data, &s.q, &s.qd, &s.qdd)))
-        .sum();
-    println!("{sum:.9e}");
-
-    measure("regressor", &states, |s| {
-        black_box(regressor(&model, &mut data, &s.q, &s.qd, &s.qdd));
-    });
-    let sum: f64 = (states.iter())
-        .map(|s| squares(regressor(&model, &mut data, &s.q, &s.qd, &s.qdd).as_slice()))
-        .sum();
-    println!("{sum:.9e}");
-
-    measure("jacobian", &states, |s| {
-        forward_kinematics(&model, &mut data, &s.q);
-        black_box(link_jacobian(&model, &mut data, tip));
-    });
-    let sum: f64 = (states.iter())
-        .map(|s| {
-            forward_kinematics(&model, &mut data, &s.q);
-            squares(link_jacobian(&model, &mut data, tip).as_slice())
-        })
-        .sum();
-    println!("{sum:.9e}");
-
-    measure("mass_matrix", &states, |s| {
-        black_box(mass_matrix(&model, &mut data, &s.q));
-    });
-    let sum: f64 = (states.iter())
-        .map(|s| squares(mass_matrix(&model, &mut data, &s.q).as_slice()))
-        .sum();
-    println!("{sum:.9e}");
+    algorithms("", &model, &states);
+    algorithms("batch_", &model, &batches(&states));
     Ok(())
 }

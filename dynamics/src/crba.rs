@@ -7,6 +7,7 @@ use crate::data::{Composite, check_lengths};
 use crate::inertia::symmetric;
 use crate::kinematics::forward_kinematics;
 use crate::model::Model;
+use crate::real::{Real, matrix, vector};
 
 /// The mass matrix \[kg m², kg m, kg\] at `q`, tool included: n x n, symmetric, both triangles filled,
 /// by the composite-rigid-body algorithm (RBDA section 6.2). Poses are computed as well, see
@@ -17,7 +18,7 @@ use crate::model::Model;
 ///
 /// # Panics
 /// If `q` does not have one number per joint, or `data` was made for a model with another number of joints.
-pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &[f64]) -> &'d DMatrix<f64> {
+pub fn mass_matrix<'d, T: Real>(model: &Model, data: &'d mut Data<T>, q: &[T]) -> &'d DMatrix<T> {
     check_lengths(model, data, &[q]);
     forward_kinematics(model, data, q);
     let Data {
@@ -25,14 +26,15 @@ pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &[f64]) -> &'d DMat
     } = data;
     for (body, slot) in model.bodies.iter().zip(&mut slots[1..]) {
         let (load, rotation, p) = (&body.load, &slot.world_rotation, &slot.world_translation);
-        let h = rotation * load.first_moment;
+        let mass = T::splat(load.mass);
+        let h = rotation * vector::<T>(&load.first_moment);
         // ∫ (R r + p)(R r + p)ᵀ dm.
-        let shift = p * (h + p * (0.5 * load.mass)).transpose();
-        let turned = rotation * load.pseudo_inertia;
+        let shift = p * (h + p * T::splat(0.5 * load.mass)).transpose();
+        let turned = rotation * matrix::<T>(&load.pseudo_inertia);
         let entry = |i, j| turned.row(i).dot(&rotation.row(j)) + shift[(i, j)] + shift[(j, i)];
         slot.composite = Composite {
-            mass: load.mass,
-            first_moment: h + p * load.mass,
+            mass,
+            first_moment: h + p * mass,
             pseudo_inertia: symmetric([
                 entry(0, 0),
                 entry(0, 1),
@@ -46,7 +48,7 @@ pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &[f64]) -> &'d DMat
     // Joints on different branches are not coupled.
     let n = model.dof();
     let entries = mass_matrix.as_mut_slice();
-    entries.fill(0.0);
+    entries.fill(T::zero());
     for (i, body) in model.bodies.iter().enumerate().rev() {
         let slot = &slots[i + 1];
         let (angular, linear) = (slot.angular, slot.linear_at_origin);

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, AddAssign, Sub};
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Scalar, Vector3};
 
 /// Number of inertial parameters of a rigid body, and of columns of [`regressor`](crate::regressor) per moving body.
 pub const PARAMETERS_PER_BODY: usize = 10;
@@ -165,7 +165,7 @@ impl Sub for Inertia {
 }
 
 /// The matrix of xx, xy, xz, yy, yz, zz.
-pub(crate) fn symmetric([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Matrix3<f64> {
+pub(crate) fn symmetric<T: Scalar + Copy>([xx, xy, xz, yy, yz, zz]: [T; 6]) -> Matrix3<T> {
     Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 

@@ -5,13 +5,14 @@ use nalgebra::{Isometry3, Matrix6xX, Rotation3, UnitQuaternion, Vector3};
 use crate::data::Data;
 use crate::data::{Slot, check_lengths};
 use crate::model::Model;
+use crate::real::{Real, vector};
 
 /// Computes the pose of every link at the positions `q` \[rad or m\] for [`link_pose`] and [`link_jacobian`] (RBDA
 /// section 4.4).
 ///
 /// # Panics
 /// If `q` does not have one number per joint, or `data` was made for a model with another number of joints.
-pub fn forward_kinematics(model: &Model, data: &mut Data, q: &[f64]) {
+pub fn forward_kinematics<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
     check_lengths(model, data, &[q]);
     for (i, body) in model.bodies.iter().enumerate() {
         let (done, rest) = data.slots.split_at_mut(i + 1);
@@ -20,7 +21,7 @@ pub fn forward_kinematics(model: &Model, data: &mut Data, q: &[f64]) {
         slot.world_rotation = parent.world_rotation * slot.rotation;
         slot.world_translation =
             parent.world_translation + parent.world_rotation * slot.translation;
-        let axis: Vector3<f64> = slot.world_rotation.column(2) * body.ratio;
+        let axis: Vector3<T> = slot.world_rotation.column(2) * T::splat(body.ratio);
         (slot.angular, slot.linear_at_origin) = if body.prismatic {
             (Vector3::zeros(), axis)
         } else {
@@ -56,11 +57,15 @@ pub(crate) fn link_origin(model: &Model, data: &Data, link: usize) -> Vector3<f6
 ///
 /// # Panics
 /// If `link` is not an index into [`Model::links`].
-pub fn link_jacobian<'d>(model: &Model, data: &'d mut Data, link: usize) -> &'d Matrix6xX<f64> {
+pub fn link_jacobian<'d, T: Real>(
+    model: &Model,
+    data: &'d mut Data<T>,
+    link: usize,
+) -> &'d Matrix6xX<T> {
     let Data {
         slots, jacobian, ..
     } = data;
-    jacobian.as_mut_slice().fill(0.0);
+    jacobian.as_mut_slice().fill(T::zero());
     columns(
         model,
         slots,
@@ -93,16 +98,16 @@ pub fn point_jacobian(
 }
 
 #[inline]
-fn columns(
+fn columns<T: Real>(
     model: &Model,
-    slots: &[Slot],
+    slots: &[Slot<T>],
     link: usize,
     point_m: &Vector3<f64>,
-    mut column: impl FnMut(usize, Vector3<f64>, Vector3<f64>),
-) -> Vector3<f64> {
+    mut column: impl FnMut(usize, Vector3<T>, Vector3<T>),
+) -> Vector3<T> {
     let frame = &model.frames[link];
     let carrier = &slots[frame.slot];
-    let on_carrier = frame.translation + frame.rotation * point_m;
+    let on_carrier = vector(&(frame.translation + frame.rotation * point_m));
     let point = carrier.world_translation + carrier.world_rotation * on_carrier;
     let before = |slot: &usize| (*slot > 0).then(|| model.bodies[*slot - 1].parent);
     let chain = |from| std::iter::successors(Some(from), before).take_while(|slot| *slot > 0);
@@ -131,7 +136,7 @@ fn columns(
 
 /// Velocity of a point of the world, and angular velocity, for a unit velocity of a body's joint.
 #[inline]
-fn velocity(slot: &Slot, point: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+fn velocity<T: Real>(slot: &Slot<T>, point: &Vector3<T>) -> (Vector3<T>, Vector3<T>) {
     (
         slot.linear_at_origin + slot.angular.cross(point),
         slot.angular,

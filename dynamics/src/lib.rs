@@ -5,7 +5,7 @@
 //! the URDF's movable joints, and the world frame is that of the URDF's root link.
 //!
 //! The algorithms follow R. Featherstone, *Rigid Body Dynamics Algorithms*, Springer 2008 ("RBDA"),
-//! written out in three dimensions.
+//! written out in three dimensions. They are generic over the number: `f64`, or [`Lanes`] for four samples at once.
 //!
 //! ```
 //! use tauscope_dynamics::{Data, Model, rnea};
@@ -45,6 +45,8 @@ pub mod kinematic_tree;
 mod kinematics;
 pub mod lowpass;
 mod model;
+mod motion_rows;
+mod real;
 mod regressor;
 mod rnea;
 mod rollout;
@@ -64,6 +66,8 @@ pub use model::{
     Limits, Link, MUJOCO, Model, ModelError, Shape, Substitute, check_bodies, fix_joints,
     with_plausible_bodies,
 };
+pub use motion_rows::{gravity_rows, rnea_rows};
+pub use real::{Lanes, Real};
 pub use regressor::regressor;
 pub use rnea::{gravity_effort, rnea};
 pub use rollout::ClosedLoop;

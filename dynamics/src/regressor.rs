@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, Matrix3, RowVector3, Vector3};
 use crate::data::{Data, Slot, check_lengths};
 use crate::inertia::PARAMETERS_PER_BODY;
 use crate::model::{Body, Model};
+use crate::real::{Real, matrix};
 use crate::rnea::accelerate;
 
 /// The joint-torque regressor Y of the motion, with effort = Y θ: n x 10 b, with n joints and b bodies: one for each
@@ -16,13 +17,13 @@ use crate::rnea::accelerate;
 ///
 /// # Panics
 /// If a slice does not have one number per joint, or `data` was made for a model with another number of joints.
-pub fn regressor<'d>(
+pub fn regressor<'d, T: Real>(
     model: &Model,
-    data: &'d mut Data,
-    q: &[f64],
-    qd: &[f64],
-    qdd: &[f64],
-) -> &'d DMatrix<f64> {
+    data: &'d mut Data<T>,
+    q: &[T],
+    qd: &[T],
+    qdd: &[T],
+) -> &'d DMatrix<T> {
     check_lengths(model, data, &[q, qd, qdd]);
     accelerate(model, data, |j| (q[j], qd[j], qdd[j]));
     let Data {
@@ -31,12 +32,12 @@ pub fn regressor<'d>(
     // A body loads only the joints that carry it.
     let n = model.dof();
     let entries = regressor.as_mut_slice();
-    entries.fill(0.0);
+    entries.fill(T::zero());
     for (i, body) in model.bodies.iter().enumerate() {
         let motion = Motion::of(body, &slots[i + 1]);
         let first = PARAMETERS_PER_BODY * body.block * n;
         // Rotation from the child link's axes to those of the current joint, and the body's origin in its frame.
-        let (mut rotation, mut origin) = (body.alignment, Vector3::zeros());
+        let (mut rotation, mut origin) = (matrix::<T>(&body.alignment), Vector3::zeros());
         let mut at = i + 1;
         loop {
             let (here, slot) = (&model.bodies[at - 1], &slots[at]);
@@ -45,11 +46,11 @@ pub fn regressor<'d>(
             let (angular, linear) = if here.prismatic {
                 (Vector3::zeros(), axis)
             } else {
-                let lever: RowVector3<f64> =
-                    rotation.row(1) * origin.x - rotation.row(0) * origin.y;
+                let lever: RowVector3<T> = rotation.row(1) * origin.x - rotation.row(0) * origin.y;
                 (axis, lever.transpose())
             };
-            let (angular, linear) = (angular * here.ratio, linear * here.ratio);
+            let ratio = T::splat(here.ratio);
+            let (angular, linear) = (angular * ratio, linear * ratio);
             let columns = entries[first..].chunks_exact_mut(n);
             for (column, value) in columns.zip(motion.power(&angular, &linear)) {
                 column[here.joint] += value;
@@ -66,25 +67,26 @@ pub fn regressor<'d>(
 }
 
 /// The motion of a body, along the axes of its link.
-struct Motion {
+struct Motion<T: Real> {
     /// Angular velocity \[rad/s\].
-    omega: Vector3<f64>,
+    omega: Vector3<T>,
     /// Angular acceleration \[rad/s²\].
-    alpha: Vector3<f64>,
+    alpha: Vector3<T>,
     /// Acceleration of the origin less gravity \[m/s²\].
-    linear: Vector3<f64>,
+    linear: Vector3<T>,
     /// Acceleration of a point of the body relative to `linear`, by its position \[1/s²\].
-    spin: Matrix3<f64>,
+    spin: Matrix3<T>,
 }
 
-impl Motion {
-    fn of(body: &Body, slot: &Slot) -> Self {
-        let to_link = body.alignment.transpose();
+impl<T: Real> Motion<T> {
+    fn of(body: &Body, slot: &Slot<T>) -> Self {
+        let alignment = matrix::<T>(&body.alignment);
+        let to_link = alignment.transpose();
         Self {
             omega: to_link * slot.omega,
             alpha: to_link * slot.alpha,
             linear: to_link * slot.linear,
-            spin: to_link * slot.spin * body.alignment,
+            spin: to_link * slot.spin * alignment,
         }
     }
 
@@ -94,7 +96,7 @@ impl Motion {
     ///
     /// The force is \[a, S, 0\], the moment \[0, -a×, L(α) + ω× L(ω)\], with I v = L(v) (xx, xy, xz, yy, yz, zz). The
     /// product avoids rotating a matrix of 3 x 10 from joint to joint.
-    fn power(&self, angular: &Vector3<f64>, linear: &Vector3<f64>) -> [f64; PARAMETERS_PER_BODY] {
+    fn power(&self, angular: &Vector3<T>, linear: &Vector3<T>) -> [T; PARAMETERS_PER_BODY] {
         let of_mass = self.linear.dot(linear);
         let of_first_moment = self.spin.tr_mul(linear) + self.linear.cross(angular);
         let of_alpha = inertia_power(&self.alpha, angular);
@@ -117,7 +119,7 @@ impl Motion {
 }
 
 /// L(v)ᵀ w: derivatives of w·I v with respect to the inertia's xx, xy, xz, yy, yz, zz.
-fn inertia_power(v: &Vector3<f64>, w: &Vector3<f64>) -> [f64; 6] {
+fn inertia_power<T: Real>(v: &Vector3<T>, w: &Vector3<T>) -> [T; 6] {
     [
         v.x * w.x,
         v.y * w.x + v.x * w.y,

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::data::Data;
 use crate::data::{Slot, check_lengths};
 use crate::model::Model;
+use crate::real::{Real, matrix, vector};
 
 /// Computes the effort \[N m or N\] of the motion `q`, `qd`, `qdd` at each joint, gravity and tool included: the
 /// recursive Newton-Euler algorithm (RBDA section 5.3).
@@ -15,13 +16,13 @@ use crate::model::Model;
 ///
 /// # Panics
 /// If a slice does not have one number per joint, or `data` was made for a model with another number of joints.
-pub fn rnea<'d>(
+pub fn rnea<'d, T: Real>(
     model: &Model,
-    data: &'d mut Data,
-    q: &[f64],
-    qd: &[f64],
-    qdd: &[f64],
-) -> &'d [f64] {
+    data: &'d mut Data<T>,
+    q: &[T],
+    qd: &[T],
+    qdd: &[T],
+) -> &'d [T] {
     check_lengths(model, data, &[q, qd, qdd]);
     recursion(model, data, |j| (q[j], qd[j], qdd[j]))
 }
@@ -31,33 +32,30 @@ pub fn rnea<'d>(
 ///
 /// # Panics
 /// As [`rnea`].
-pub fn gravity_effort<'d>(model: &Model, data: &'d mut Data, q: &[f64]) -> &'d [f64] {
+pub fn gravity_effort<'d, T: Real>(model: &Model, data: &'d mut Data<T>, q: &[T]) -> &'d [T] {
     check_lengths(model, data, &[q]);
-    recursion(model, data, |j| (q[j], 0.0, 0.0))
+    recursion(model, data, |j| (q[j], T::zero(), T::zero()))
 }
 
 #[inline]
-fn recursion<'d>(
+fn recursion<'d, T: Real>(
     model: &Model,
-    data: &'d mut Data,
-    motion: impl Fn(usize) -> (f64, f64, f64),
-) -> &'d [f64] {
+    data: &'d mut Data<T>,
+    motion: impl Fn(usize) -> (T, T, T),
+) -> &'d [T] {
     accelerate(model, data, motion);
     for (i, body) in model.bodies.iter().enumerate() {
         let slot = &mut data.slots[i + 1];
         let load = &body.load;
-        let (spin, k, a, h) = (
-            &slot.spin,
-            &load.pseudo_inertia,
-            &slot.linear,
-            &load.first_moment,
-        );
-        slot.force = a * load.mass + spin * h;
+        let k = matrix::<T>(&load.pseudo_inertia);
+        let h = vector::<T>(&load.first_moment);
+        let (spin, a) = (&slot.spin, &slot.linear);
+        slot.force = a * T::splat(load.mass) + spin * h;
         let m = spin * k;
         slot.moment = Vector3::new(m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12) + h.cross(a);
     }
     let Data { slots, effort, .. } = data;
-    effort.fill(0.0);
+    effort.fill(T::zero());
     for (i, body) in model.bodies.iter().enumerate().rev() {
         let (done, rest) = slots.split_at_mut(i + 1);
         let (parent, slot) = (&mut done[body.parent], &rest[0]);
@@ -66,7 +64,7 @@ fn recursion<'d>(
         } else {
             slot.moment.z
         };
-        effort[body.joint] += body.ratio * own;
+        effort[body.joint] += T::splat(body.ratio) * own;
         if body.parent > 0 {
             let force = slot.rotation * slot.force;
             parent.moment += slot.rotation * slot.moment + slot.translation.cross(&force);
@@ -78,34 +76,36 @@ fn recursion<'d>(
 
 /// Computes pose, angular velocity and accelerations of every body.
 #[inline]
-pub(crate) fn accelerate(
+pub(crate) fn accelerate<T: Real>(
     model: &Model,
-    data: &mut Data,
-    motion: impl Fn(usize) -> (f64, f64, f64),
+    data: &mut Data<T>,
+    motion: impl Fn(usize) -> (T, T, T),
 ) {
     let base = &mut data.slots[0];
-    base.linear = -model.gravity;
+    base.linear = vector(&-model.gravity);
     for (i, body) in model.bodies.iter().enumerate() {
         let (done, rest) = data.slots.split_at_mut(i + 1);
         let (parent, slot) = (&done[body.parent], &mut rest[0]);
         let (q, qd, qdd) = motion(body.joint);
         slot.place(body, q);
-        let (qd, qdd) = (body.ratio * qd, body.ratio * qdd);
+        let ratio = T::splat(body.ratio);
+        let (qd, qdd) = (ratio * qd, ratio * qdd);
         follow(parent, slot, body.prismatic, qd, qdd);
     }
 }
 
 /// Computes velocity and acceleration of a body from those of its parent; the joint's axis is the body's z.
 #[inline]
-fn follow(parent: &Slot, slot: &mut Slot, prismatic: bool, qd: f64, qdd: f64) {
+fn follow<T: Real>(parent: &Slot<T>, slot: &mut Slot<T>, prismatic: bool, qd: T, qdd: T) {
     let r = &slot.rotation;
     let mut omega = r.tr_mul(&parent.omega);
     let mut alpha = r.tr_mul(&parent.alpha);
     let mut linear = r.tr_mul(&(parent.linear + parent.spin * slot.translation));
     if prismatic {
         // Coriolis: 2 ω × z qd.
-        linear.x += 2.0 * omega.y * qd;
-        linear.y -= 2.0 * omega.x * qd;
+        let twice = qd + qd;
+        linear.x += omega.y * twice;
+        linear.y -= omega.x * twice;
         linear.z += qdd;
     } else {
         // ω × z qd.
@@ -122,7 +122,7 @@ fn follow(parent: &Slot, slot: &mut Slot, prismatic: bool, qd: f64, qdd: f64) {
 
 /// \[α×\] + \[ω×\]².
 #[inline]
-fn spin(w: &Vector3<f64>, a: &Vector3<f64>) -> Matrix3<f64> {
+fn spin<T: Real>(w: &Vector3<T>, a: &Vector3<T>) -> Matrix3<T> {
     let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
     let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
     Matrix3::new(

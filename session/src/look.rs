@@ -357,7 +357,9 @@ impl Head {
             self.forms.len() - 1
         });
         let fields = [&message.position, &message.velocity, &message.effort];
-        fields.map(|field| self.numbers.extend_from_slice(field));
+        for field in fields {
+            self.numbers.extend_from_slice(field);
+        }
         self.messages.push(Brief {
             log_time_ns,
             stamp: message.header.stamp,

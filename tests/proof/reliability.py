@@ -169,7 +169,8 @@ def svg(pairs):
 
 def grounds(finding):
     """The row of a finding in the regression: as in findings.rs."""
-    return [1., math.log1p(max(finding["evidence_nats"], 0.))]
+    margin = finding["evidence_nats"]
+    return [1., math.copysign(math.log1p(abs(margin)), margin)]
 
 
 def regression(rows, right, spread=2.):

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use tauscope_dynamics::terms::{MotionSample, Physics, STANDSTILL_RAD_S};
-use tauscope_dynamics::{Data, Model, rnea};
+use tauscope_dynamics::{Model, gravity_rows, rnea_rows};
 
 use crate::data::quiet_start::quiet_s;
 use crate::data::smoother::{LowPass, MotionSmoother};
@@ -78,18 +78,7 @@ impl Track {
             }
         }
         if recording.reference.is_empty() {
-            let mut data = Data::new(model);
-            for k in 0..count {
-                let row = k * n..(k + 1) * n;
-                let effort = rnea(
-                    model,
-                    &mut data,
-                    &track.position[row.clone()],
-                    &track.velocity[row.clone()],
-                    &track.acceleration[row.clone()],
-                );
-                track.rigid[row].copy_from_slice(effort);
-            }
+            track.rigid = track.rigid_effort(model, true);
         } else {
             for (k, value) in recording.reference.iter().enumerate() {
                 track.rigid[k] = value * constants[k % n];
@@ -172,6 +161,15 @@ impl Track {
             rigid: rows(&self.rigid),
             beside: rows(&self.beside),
             quiet_s: self.quiet_s,
+        }
+    }
+
+    /// Computes the effort of a rigid robot over the track or, if not `moving`, the effort against gravity alone.
+    pub fn rigid_effort(&self, model: &Model, moving: bool) -> Vec<f64> {
+        if moving {
+            rnea_rows(model, &self.position, &self.velocity, &self.acceleration)
+        } else {
+            gravity_rows(model, &self.position)
         }
     }
 

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{MotionSample, Physics, Term};
-use tauscope_dynamics::{Data, Model, gravity_effort, rnea};
 
 use crate::data::efforts::TrackEfforts;
 use crate::data::problem::Problem;
@@ -48,19 +48,8 @@ pub fn act_over(
 /// Computes the effort of a model over the motion of all tracks or, if not `moving`, the effort against gravity
 /// alone.
 pub fn over_tracks(problem: &Problem, model: &Model, moving: bool) -> TrackEfforts {
-    let mut data = Data::new(model);
-    let mut of = |track: &FitTrack| {
-        let mut effort = Vec::with_capacity(track.track.position.len());
-        track.track.each(|_, at| {
-            effort.extend_from_slice(if moving {
-                rnea(model, &mut data, at.position, at.velocity, at.acceleration)
-            } else {
-                gravity_effort(model, &mut data, at.position)
-            });
-        });
-        effort
-    };
-    problem.tracks.iter().map(&mut of).collect()
+    let of = |track: &FitTrack| track.track.rigid_effort(model, moving);
+    problem.tracks.iter().map(of).collect()
 }
 
 /// Computes the effort of a robot along the recorded motion, for [`Term::know_recorded`].

@@ -38,7 +38,8 @@ use waves::merge_waves;
 /// Chosen: that of a time anywhere in a pause of 17 s, 17 s / √12; an interval as wide only shows the pause.
 const VAGUE_S: f64 = 5.0;
 
-/// Coefficients of a finding's log-odds: intercept, and slope over the logarithm of one plus its margin. Statistical:
+/// Coefficients of a finding's log-odds: intercept, and slope over the logarithm of one plus the size of its margin, with
+/// the margin's sign. Statistical:
 /// `python tests/proof/reliability.py tauscope OUT --first 20001 --cases 200 --half even --fit`, 268 findings of 100
 /// cases.
 const CONFIDENCE: [f64; 2] = [0.55, 0.46];
@@ -181,10 +182,11 @@ pub fn of(
     named
 }
 
-/// Returns the confidence of a finding from its margin: the loss of evidence without it \[nats\].
+/// Returns the confidence of a finding from its margin: the loss of evidence without it \[nats\]. It is negative where
+/// another effect in its place would be more probable.
 fn confidence_of(margin: f64) -> f64 {
     let [base, slope] = CONFIDENCE;
-    1.0 / (1.0 + (-base - slope * margin.max(0.0).ln_1p()).exp())
+    1.0 / (1.0 + (-base - slope * margin.signum() * margin.abs().ln_1p()).exp())
 }
 
 /// Returns the parameters of an effect by name, and their 95 % intervals.

@@ -5,7 +5,7 @@ mod without_sign;
 
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::STANDSTILL_RAD_S;
-use tauscope_dynamics::{Data, Inertia, Link, Model, rnea};
+use tauscope_dynamics::{Inertia, Link, Model, rnea_rows};
 
 use super::{Reading, Remedy, SUSPECT};
 use crate::data::efforts::TrackEfforts;
@@ -100,18 +100,15 @@ impl<'a> Trial<'a> {
         if !reading.weighs {
             model.set_gravity([0.0; 3]);
         }
-        let mut data = Data::new(&model);
-        let times = |all: &[f64]| -> Vec<f64> {
-            let pairs = reading.place.iter().zip(&reading.position);
-            pairs.map(|(&at, factor)| all[at] * factor).collect()
+        let times = |all: &Vec<f64>| -> Vec<f64> {
+            let pairs = || reading.place.iter().zip(&reading.position);
+            let rows = all.chunks_exact(reading.place.len());
+            rows.flat_map(|row| pairs().map(|(&at, factor)| row[at] * factor))
+                .collect()
         };
         self.efforts(|track| {
-            let mut effort = Vec::with_capacity(track.position.len());
-            track.each(|_, at| {
-                let [q, qd, qdd] = [at.position, at.velocity, at.acceleration].map(times);
-                effort.extend_from_slice(rnea(&model, &mut data, &q, &qd, &qdd));
-            });
-            effort
+            let [q, qd, qdd] = [&track.position, &track.velocity, &track.acceleration].map(times);
+            rnea_rows(&model, &q, &qd, &qdd)
         })
     }
 
@@ -278,15 +275,7 @@ impl<'a> Trial<'a> {
             let mut parameters = [0.0; 10];
             parameters[k] = 1.0;
             let ghost: Model = robot.ghost(link, Inertia::from_parameters(parameters));
-            let mut data = Data::new(&ghost);
-            self.efforts(|track| {
-                let mut effort = Vec::with_capacity(track.position.len());
-                track.each(|_, at| {
-                    let [q, qd, qdd] = [at.position, at.velocity, at.acceleration];
-                    effort.extend_from_slice(rnea(&ghost, &mut data, q, qd, qdd));
-                });
-                effort
-            })
+            self.efforts(|track| track.rigid_effort(&ghost, true))
         };
         let columns: Vec<Vec<f64>> = (0..10).map(unit).collect();
         self.fitted(self.problem.rigid(), &columns)

@@ -1,7 +1,6 @@
 //! Orientation of the base that makes efforts match: a robot on a wall or a ceiling.
 
 use nalgebra::Vector3;
-use tauscope_dynamics::{Data, gravity_effort};
 
 use super::Trial;
 use crate::data::remedies::Remedy;
@@ -54,14 +53,7 @@ impl Trial<'_> {
     fn against_gravity(&self, gravity: [f64; 3]) -> Vec<f64> {
         let mut model = self.problem.model.clone();
         model.set_gravity(gravity);
-        let mut data = Data::new(&model);
-        self.efforts(|track| {
-            let mut effort = Vec::with_capacity(track.position.len());
-            track.each(|_, at| {
-                effort.extend_from_slice(gravity_effort(&model, &mut data, at.position));
-            });
-            effort
-        })
+        self.efforts(|track| track.rigid_effort(&model, false))
     }
 }
 
