@@ -23,6 +23,9 @@ const RELATED: f64 = 0.3;
 /// Smallest square of an effort, as a share of the usual one. Resolution: of the rounding of efforts.
 const LEAST_SQUARE: f64 = 1e-18;
 
+/// Variants whose columns are projected on the nuisances together. Resolution: changes the computing time and the memory.
+const BLOCK: usize = 32;
+
 /// An explanation: indices of variants, ascending.
 pub type Set = Vec<usize>;
 
@@ -51,6 +54,14 @@ pub(super) struct Base {
     pub(super) offsets: Vec<usize>,
 }
 
+/// The columns of a variant with their scales: its offset first, if it has one.
+fn scaled(given: &Given) -> Vec<(&Column, f64)> {
+    let offset = given.alone.iter().map(|alone| (alone, 1.0));
+    let factors = given.factors.iter().zip(&given.variant.deviations);
+    let factors = factors.map(|(factor, deviation)| (&**factor, *deviation));
+    offset.chain(factors).collect()
+}
+
 impl<'a> Objective<'a> {
     /// The objective for a measurement, a signal, and the columns of variants.
     pub fn new(space: &'a Space, measured: &Column, given: Vec<Given>) -> Self {
@@ -71,11 +82,7 @@ impl<'a> Objective<'a> {
 
     /// The columns of a variant, whitened: its offset first, if it has one.
     pub(super) fn whitened(&self, given: &Given) -> Vec<Whitened> {
-        let column = |column: &Column, scale: f64| self.space.column(column, scale, &self.measured);
-        let offset = given.alone.iter().map(|alone| column(alone, 1.0));
-        let factors = given.factors.iter().zip(&given.variant.deviations);
-        let factors = factors.map(|(factor, deviation)| column(factor, *deviation));
-        offset.chain(factors).collect()
+        self.space.columns(&scaled(given), &self.measured)
     }
 
     /// Products of some columns with each other.
@@ -86,8 +93,14 @@ impl<'a> Objective<'a> {
 
     /// Adds variants, behind those that it has.
     pub fn extend(&mut self, given: Vec<Given>) {
-        let whitened = parallel::map(&given, |given| self.whitened(given));
-        for (given, columns) in given.into_iter().zip(whitened) {
+        let blocks: Vec<&[Given]> = given.chunks(BLOCK).collect();
+        let whitened = parallel::map(&blocks, |block| {
+            let all: Vec<(&Column, f64)> = block.iter().flat_map(scaled).collect();
+            self.space.columns(&all, &self.measured)
+        });
+        let mut whitened = whitened.into_iter().flatten();
+        for given in given {
+            let columns: Vec<Whitened> = whitened.by_ref().take(scaled(&given).len()).collect();
             let mut variant = given.variant;
             let at = self.columns.len();
             variant.offset = given.alone.is_some().then_some(at);

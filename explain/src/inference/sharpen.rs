@@ -277,11 +277,15 @@ impl Search<'_> {
             (column.joint == here.joint).then_some(column)
         };
         let derivatives: Option<Vec<Column>> = coordinates.iter().map(derivative).collect();
+        let derivatives = derivatives?;
+        let unscaled: Vec<(&Column, f64)> =
+            derivatives.iter().map(|column| (column, 1.0)).collect();
         let mut all = whitened;
-        for column in derivatives? {
-            let objective = self.objective;
-            all.push(objective.space.column(&column, 1.0, &objective.measured));
-        }
+        all.extend(
+            self.objective
+                .space
+                .columns(&unscaled, &self.objective.measured),
+        );
         let solved = self.solved(&all, given.alone.is_some())?;
         let steps = coordinates.iter().zip(solved.iter().skip(factors.len()));
         Some(steps.map(|(&(c, width), x)| (c, x * width)).collect())

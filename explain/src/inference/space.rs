@@ -13,6 +13,9 @@ use crate::parallel;
 use super::noise::Whitener;
 use super::rows::Rows;
 
+/// Columns that are projected on the nuisances together. Resolution: changes the computing time.
+const BLOCK: usize = 16;
+
 /// A whitened column, with the nuisances projected out of its products.
 #[derive(Debug)]
 pub struct Whitened {
@@ -38,6 +41,8 @@ pub struct Space {
     /// Index of each joint's first row in a whitened signal.
     pub(super) first: Vec<usize>,
     pub(super) nuisances: Vec<(Option<usize>, Vec<f64>)>,
+    /// By joint, its nuisances as rows: index in `nuisances`, and values.
+    of_joint: Vec<(Vec<usize>, DMatrix<f64>)>,
     factor: Cholesky<f64, Dyn>,
     rows_of_problem: usize,
     /// Square of each joint's measured effort, whitened.
@@ -62,6 +67,7 @@ impl Space {
             filters,
             first,
             nuisances: Vec::new(),
+            of_joint: Vec::new(),
             factor: Cholesky::new(DMatrix::identity(1, 1)).unwrap_or_else(|| unreachable!()),
             rows_of_problem: problem.rows,
             effort_squares: Vec::new(),
@@ -74,22 +80,37 @@ impl Space {
         };
         space.effort_squares = (0..problem.joints).map(of_joint).collect();
         space.nuisances = parallel::map(nuisances, |c| (c.joint, space.whitened(c, 1.0)));
-        let products = parallel::map(&(0..count).collect::<Vec<_>>(), |&a| {
-            let own = &space.nuisances[a];
-            (0..=a)
-                .map(|b| {
-                    let other = &space.nuisances[b];
-                    space.dot((own.0, &own.1), (other.0, &other.1))
-                })
-                .collect::<Vec<f64>>()
-        });
-        let normal = DMatrix::from_fn(count, count, |a, b| {
-            products[a.max(b)][a.min(b)] + f64::from(u8::from(a == b))
-        });
+        let joints: Vec<usize> = (0..problem.joints).collect();
+        space.of_joint = parallel::map(&joints, |&joint| space.rows_of(joint));
+        let products = parallel::map(&space.of_joint, |(_, rows)| rows * rows.transpose());
+        let mut normal = DMatrix::identity(count, count);
+        for ((index, _), product) in space.of_joint.iter().zip(&products) {
+            for (a, &i) in index.iter().enumerate() {
+                for (b, &j) in index.iter().enumerate() {
+                    normal[(i, j)] += product[(a, b)];
+                }
+            }
+        }
         space.factor = Cholesky::new(normal).unwrap_or_else(|| {
             Cholesky::new(DMatrix::identity(count, count)).unwrap_or_else(|| unreachable!())
         });
         space
+    }
+
+    /// The nuisances that a joint feels, as rows.
+    fn rows_of(&self, joint: usize) -> (Vec<usize>, DMatrix<f64>) {
+        let range = self.first[joint]..self.first[joint + 1];
+        let felt = self.nuisances.iter().enumerate().filter_map(|(i, own)| {
+            let values = match own.0 {
+                None => &own.1[range.clone()],
+                Some(only) if only == joint => &own.1,
+                Some(_) => return None,
+            };
+            Some((i, values))
+        });
+        let felt: Vec<(usize, &[f64])> = felt.collect();
+        let rows = DMatrix::from_fn(felt.len(), range.len(), |a, k| felt[a].1[k]);
+        (felt.into_iter().map(|(i, _)| i).collect(), rows)
     }
 
     /// A measurement, whitened.
@@ -99,18 +120,30 @@ impl Space {
         Measured { values, projected }
     }
 
-    /// A column times `scale`, with its product with a measurement.
-    pub fn column(&self, column: &Column, scale: f64, measured: &Measured) -> Whitened {
-        let values = self.whitened(column, scale);
-        let projected = self.project(column.joint, &values);
-        let with_measured = self.dot((column.joint, &values), (None, &measured.values));
-        let right = with_measured - projected.dot(&measured.projected);
-        Whitened {
-            joint: column.joint,
-            values,
-            projected,
-            right,
-        }
+    /// Columns times their scales, with their products with a measurement.
+    pub fn columns(&self, columns: &[(&Column, f64)], measured: &Measured) -> Vec<Whitened> {
+        let values: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|(c, scale)| self.whitened(c, *scale))
+            .collect();
+        let all: Vec<(Option<usize>, &[f64])> = columns
+            .iter()
+            .zip(&values)
+            .map(|((c, _), values)| (c.joint, &**values))
+            .collect();
+        let projected = self.projections(&all);
+        let pairs = columns.iter().zip(values).zip(projected.column_iter());
+        let whitened = pairs.map(|(((column, _), values), projected)| {
+            let with_measured = self.dot((column.joint, &values), (None, &measured.values));
+            let projected = projected.into_owned();
+            Whitened {
+                joint: column.joint,
+                right: with_measured - projected.dot(&measured.projected),
+                values,
+                projected,
+            }
+        });
+        whitened.collect()
     }
 
     /// Product of two columns.
@@ -150,10 +183,36 @@ impl Space {
     }
 
     fn project(&self, joint: Option<usize>, values: &[f64]) -> DVector<f64> {
-        let of = |(own, nuisance): &(Option<usize>, Vec<f64>)| {
-            self.dot((*own, nuisance), (joint, values))
-        };
-        let mut right = DVector::from_iterator(self.nuisances.len(), self.nuisances.iter().map(of));
+        self.projections(&[(joint, values)]).column(0).into_owned()
+    }
+
+    /// Projections of signals on the nuisances, a column each: matrix products, joint by joint.
+    fn projections(&self, signals: &[(Option<usize>, &[f64])]) -> DMatrix<f64> {
+        let mut right = DMatrix::zeros(self.nuisances.len(), signals.len());
+        for (joint, (index, rows)) in self.of_joint.iter().enumerate() {
+            let range = self.first[joint]..self.first[joint + 1];
+            let felt = signals
+                .iter()
+                .enumerate()
+                .filter_map(|(k, (only, values))| match only {
+                    None => Some((k, &values[range.clone()])),
+                    Some(only) => (*only == joint).then_some((k, *values)),
+                });
+            let felt: Vec<(usize, &[f64])> = felt.collect();
+            let own = felt
+                .iter()
+                .map(|(_, values)| DVector::from_column_slice(values));
+            let own: Vec<DVector<f64>> = own.collect();
+            if own.is_empty() {
+                continue;
+            }
+            let products = rows * DMatrix::from_columns(&own);
+            for (b, (k, _)) in felt.iter().enumerate() {
+                for (a, &i) in index.iter().enumerate() {
+                    right[(i, *k)] += products[(a, b)];
+                }
+            }
+        }
         self.factor.l_dirty().solve_lower_triangular_mut(&mut right);
         right
     }
@@ -161,7 +220,10 @@ impl Space {
     /// Products of some columns among each other and with the residual, nuisances projected out.
     pub fn products(&self, columns: &[&Column], residual: &Column) -> Products {
         let measured = self.measured(residual);
-        let all = parallel::map(columns, |column| self.column(column, 1.0, &measured));
+        let unscaled: Vec<(&Column, f64)> = columns.iter().map(|column| (*column, 1.0)).collect();
+        let blocks: Vec<&[(&Column, f64)]> = unscaled.chunks(BLOCK).collect();
+        let all = parallel::map(&blocks, |block| self.columns(block, &measured));
+        let all: Vec<Whitened> = all.into_iter().flatten().collect();
         let count = columns.len();
         let mut normal = DMatrix::zeros(count, count);
         for (a, column) in all.iter().enumerate() {
