@@ -36,7 +36,7 @@ fn states(dof: usize) -> Vec<State<f64>> {
     (0..STATES).map(state).collect()
 }
 
-/// The same states, four at once.
+/// Batches of four states.
 fn batches(states: &[State<f64>]) -> Vec<State<Lanes>> {
     let of = |four: &[State<f64>; 4], field: fn(&State<f64>) -> &[f64]| {
         let joint = |j: usize| Lanes::from([0, 1, 2, 3].map(|lane| field(&four[lane])[j]));

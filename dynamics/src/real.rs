@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, SimdRealField, Vector3};
 use simba::simd::WideF64x4;
 
-/// The same number of four samples, in SIMD lanes.
+/// One number of each of four samples, in SIMD lanes.
 pub type Lanes = WideF64x4;
 
 /// A number of the algorithms: `f64`, or [`Lanes`] for four samples of a batch at once. The algorithms are the same; a

@@ -183,7 +183,7 @@ fn check_stages(
         slow: Vec::new(),
     };
     let mut order = wiring.map_or_else(|| (0..count).collect(), |wiring| wiring.order.clone());
-    // Those without an output last: a publisher tells of twins that are not among its inputs.
+    // Stages without an output last: a publisher reports facts about twins that are not among its inputs.
     order.sort_by_key(|&index| wiring.is_some_and(|wiring| wiring.roles[index].gives.is_none()));
     for index in order {
         if let Some(part) = check.entry(index).parts.first() {

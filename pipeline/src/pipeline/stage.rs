@@ -109,9 +109,10 @@ pub struct Kind {
     pub(super) settings: fn(serde_json::Value) -> Result<Settings, serde_json::Error>,
 }
 
-/// Reads a part of a pipeline file of any format.
-type Read =
-    fn(&mut dyn erased_serde::Deserializer<'_>) -> Result<Box<dyn AnyConfig>, erased_serde::Error>;
+/// Reads a part of a pipeline file of any format; `None` for a null.
+type Read = fn(
+    &mut dyn erased_serde::Deserializer<'_>,
+) -> Result<Option<Box<dyn AnyConfig>>, erased_serde::Error>;
 
 impl Kind {
     /// Returns the entry of the kind with this part of the pipeline file.
@@ -124,7 +125,10 @@ impl Kind {
             keep: C::KEEP,
             hears_health: C::HEARS_HEALTH,
             judges_contact: C::JUDGES_CONTACT,
-            read: |file| Ok(Box::new(erased_serde::deserialize::<C>(file)?)),
+            read: |file| {
+                let config = erased_serde::deserialize::<Option<C>>(file)?;
+                Ok(config.map(|config| Box::new(config) as Box<dyn AnyConfig>))
+            },
             schema: |generator| generator.subschema_for::<Option<C>>(),
             settings: |value| {
                 let settings: C::Settings = serde_json::from_value(value)?;

@@ -55,10 +55,10 @@ pub struct Entry {
     pub(crate) state_schema: fn(&mut SchemaGenerator) -> Option<Schema>,
 }
 
-/// Reads settings from a file of any format.
+/// Reads settings from a file of any format; `None` for a null.
 type Read = fn(
     &mut dyn erased_serde::Deserializer<'_>,
-) -> Result<Box<dyn AnySettings>, erased_serde::Error>;
+) -> Result<Option<Box<dyn AnySettings>>, erased_serde::Error>;
 
 impl Entry {
     /// Returns the entry of the detector with settings of type `S`.
@@ -74,7 +74,10 @@ impl Entry {
             is_calibrated: S::is_calibrated,
             largest_score: S::largest_score,
             settings: || Box::new(S::default()),
-            read: |file| Ok(Box::new(erased_serde::deserialize::<S>(file)?)),
+            read: |file| {
+                let settings = erased_serde::deserialize::<Option<S>>(file)?;
+                Ok(settings.map(|settings| Box::new(settings) as Box<dyn AnySettings>))
+            },
             schema: |generator| generator.subschema_for::<Option<S>>(),
             state_schema: S::state_schema,
         }

@@ -75,7 +75,7 @@ pub struct LiveSite<'a> {
     pub stage: &'a str,
     /// Its cells.
     pub cells: &'a [Cell],
-    /// How often it was restarted.
+    /// Number of restarts.
     pub restarts: u64,
     /// Stamp of the last emitted sample, for a source that is restarted \[ns\].
     pub after_ns: Option<i64>,

@@ -84,29 +84,8 @@ impl<'de> DeserializeSeed<'de> for Optional {
     type Value = Option<Box<dyn AnySettings>>;
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
-        deserializer.deserialize_option(self)
-    }
-}
-
-impl<'de> Visitor<'de> for Optional {
-    type Value = Option<Box<dyn AnySettings>>;
-
-    fn expecting(&self, text: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(text, "the settings of {}", self.0.name)
-    }
-
-    fn visit_none<E>(self) -> Result<Self::Value, E> {
-        Ok(None)
-    }
-
-    fn visit_unit<E>(self) -> Result<Self::Value, E> {
-        Ok(None)
-    }
-
-    fn visit_some<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
         let mut deserializer = <dyn erased_serde::Deserializer<'_>>::erase(deserializer);
-        let settings = (self.0.read)(&mut deserializer).map_err(D::Error::custom)?;
-        Ok(Some(settings))
+        (self.0.read)(&mut deserializer).map_err(D::Error::custom)
     }
 }
 
