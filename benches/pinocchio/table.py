@@ -15,8 +15,7 @@ def fastest(path):
 folder, robot = Path(sys.argv[1]), sys.argv[2]
 ours, our_sums = fastest(folder / "ours")
 theirs, their_sums = fastest(folder / "theirs")
-print(f"\n| {robot}, ns per sample | ours | in batches of four | Pinocchio | ours / Pinocchio | batches / Pinocchio"
-      " | its generated code | ours / generated | batches / generated |")
+print(f"\n| {robot} [ns] | ours | batches | Pinocchio (P) | ours / P | batches / P | generated (G) | ours / G | batches / G |")
 print("| --- " + "| ---: " * 8 + "|")
 wrong = []
 for name in (name for name in ours if not name.startswith("batch_")):

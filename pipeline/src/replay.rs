@@ -186,7 +186,6 @@ impl<'a> Replay<'a> {
                 continue;
             }
             let behind = listened.first().copied().unwrap_or(index);
-            let facts = self.pipeline.streams(&listened);
             let mut site = ReplaySite {
                 cell,
                 recording,
@@ -194,9 +193,8 @@ impl<'a> Replay<'a> {
                 source: &self.source.1.config,
                 keeps_twin: self.twin == TwinChoice::Keep,
                 reads_ahead: self.reads_ahead,
-                cells: self.pipeline.cells_of(&facts),
-                streams: facts,
-                provenance: self.pipeline.provenance(),
+                pipeline: self.pipeline,
+                inputs: &listened,
                 shared: shared.entry(behind).or_default().clone(),
                 findings: &mut findings,
                 files: &mut files,

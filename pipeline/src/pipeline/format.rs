@@ -23,18 +23,9 @@ static KIND_KEYS: LazyLock<Vec<(&'static str, &'static Kind)>> = LazyLock::new(|
         .collect()
 });
 
-/// All keys of an entry.
-static KEYS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
-    let common = [
-        "name", "cell", "host", "process", "input", "inputs", "keep", "wake", "restart",
-    ];
-    let kinds = KIND_KEYS.iter().map(|(key, _)| *key);
-    common.into_iter().chain(kinds).collect()
-});
-
 impl<'de> Deserialize<'de> for StageEntry {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_struct("StageEntry", &KEYS, Entry)
+        deserializer.deserialize_map(Entry)
     }
 }
 
@@ -56,7 +47,7 @@ impl<'de> Visitor<'de> for Entry {
         };
         let common = Common::deserialize(MapAccessDeserializer::new(rest))?;
         // In the order of the table, whatever the order of the map.
-        parts.sort_by_key(|part| KEYS.iter().position(|key| *key == part.key));
+        parts.sort_by_key(|part| KIND_KEYS.iter().position(|(key, _)| *key == part.key));
         Ok(StageEntry { common, parts })
     }
 }
@@ -76,9 +67,6 @@ impl<'de, A: MapAccess<'de>> MapAccess<'de> for CommonKeys<'_, A> {
     ) -> Result<Option<K::Value>, A::Error> {
         while let Some(key) = self.map.next_key::<String>()? {
             let Some((key, kind)) = KIND_KEYS.iter().find(|(known, _)| *known == key) else {
-                if !KEYS.contains(&key.as_str()) {
-                    return Err(A::Error::unknown_field(&key, &KEYS));
-                }
                 return seed.deserialize(StrDeserializer::new(&key)).map(Some);
             };
             if self.parts.iter().any(|part| part.key == *key) {

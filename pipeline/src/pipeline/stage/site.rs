@@ -9,6 +9,7 @@ use tauscope_ingest::Findings;
 
 use crate::build::BuildError;
 use crate::cell::Cell;
+use crate::pipeline::Pipeline;
 use crate::report::Report;
 
 /// Reason why the node of a stage cannot be created.
@@ -113,12 +114,10 @@ pub struct ReplaySite<'a> {
     pub keeps_twin: bool,
     /// Whether the recording is read in a separate thread.
     pub reads_ahead: bool,
-    /// The cells of its input streams.
-    pub cells: Vec<&'a Cell>,
-    /// Its input streams.
-    pub streams: Vec<StreamFacts>,
-    /// Provenance of the archive.
-    pub provenance: BTreeMap<String, String>,
+    /// The pipeline.
+    pub pipeline: &'a Pipeline,
+    /// Indices of the stages whose streams it receives.
+    pub inputs: &'a [usize],
     /// Values that the detectors behind one twin share, because they process the same samples.
     pub shared: tauscope_detect::Shared,
     /// Findings of the source, which it sets.

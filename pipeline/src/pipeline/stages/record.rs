@@ -74,7 +74,9 @@ impl StageSettings for Config {
         let Some(config) = redirect(self, site.out, site.recording, site.files) else {
             return Ok(None);
         };
-        let recorder = recorder(&config, &site.cells, &site.streams, &site.provenance)?;
+        let streams = site.pipeline.streams(site.inputs);
+        let cells = site.pipeline.cells_of(&streams);
+        let recorder = recorder(&config, &cells, &streams, &site.pipeline.provenance())?;
         Ok(Some(Node::sink(Box::new(recorder))))
     }
 
